@@ -235,6 +235,9 @@ enum mrfgs_status mrfgs_calibration_of_texts(const char *const *texts,
 // States the unit of the baseline, where the files do not or wrongly: "mm", "cm" or "m".
 enum mrfgs_status mrfgs_calibration_unit(struct mrfgs_calibration *calibration, const char *unit);
 
+// Makes it that of a part of the images, for images that show that part alone, as it is or scaled. Both cameras have the same part.
+enum mrfgs_status mrfgs_calibration_crop(struct mrfgs_calibration *calibration, const struct mrfgs_region *part);
+
 // Frees a calibration; it may be null.
 void mrfgs_calibration_free(struct mrfgs_calibration *calibration);
 
@@ -468,8 +471,8 @@ enum mrfgs_status mrfgs_check_masked(const struct mrfgs_image *left,
                                      const struct mrfgs_range *range);
 
 // What the last mrfgs_check() of this thread has found to be probably wrong, or the last mrfgs_match(), which sees whether many
-// disparities are at an end of the range, or the last mrfgs_rectification_new(), which sees whether the calibration is of other images; a
-// line for each, "" where all seems well. It stays until the next one that succeeds.
+// disparities are at an end of the range, or the last mrfgs_rectification_new() or mrfgs_rig_of_calibration(), which see whether the
+// calibration is of other images or in another unit; a line for each, "" where all seems well. It stays until the next one that succeeds.
 const char *mrfgs_last_warnings(void);
 
 #ifdef __cplusplus

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use mrfgs::calibration::{self, cameras::StereoCalibration};
 
 use crate::argument;
+use crate::range::Region;
 use crate::status::{Failure, Status, call};
 
 /// What is known of a pair of cameras.
@@ -63,6 +64,23 @@ pub unsafe extern "C" fn mrfgs_calibration_unit(
         calibration.0.set_unit(
             known.map_err(|expected| Failure::argument(format!("the unit is {unit:?}: give {expected}")))?,
         );
+        Ok(())
+    })
+}
+
+/// Makes it that of a part of the images, for images that show that part alone, as it is or scaled. Both cameras have the same part.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_calibration_crop(
+    calibration: *mut Calibration,
+    part: *const Region,
+) -> Status {
+    call(|| {
+        // SAFETY: the caller promises that it is null, or good and used by nobody else.
+        let calibration = unsafe { calibration.as_mut() };
+        let calibration = calibration.ok_or_else(|| Failure::argument("the calibration is null"))?;
+        // SAFETY: the caller promises that the pointer is null or good.
+        let part = unsafe { Region::part(part) }.ok_or_else(|| Failure::argument("the part is null"))?;
+        calibration.0 = calibration.0.of_part(&part)?;
         Ok(())
     })
 }

@@ -193,6 +193,27 @@ fn copied<'a, T, const BYTES: usize>(
 /// # Safety
 /// The images and masks are null or good, and nobody changes their data until this returns.
 pub(crate) unsafe fn pair(images: [*const Image; 2], masks: [*const Image; 2]) -> Result<Pair, Failure> {
+    // SAFETY: the caller promises it.
+    let [left, right] = unsafe { rasters(images, masks) }?;
+    Ok(Pair::of_frames(left, right)?)
+}
+
+/// The same of images as two cameras took them, which may differ in size.
+///
+/// # Safety
+/// As of [`pair`].
+pub(crate) unsafe fn raw_pair(images: [*const Image; 2]) -> Result<Pair, Failure> {
+    // SAFETY: the caller promises it.
+    let [left, right] = unsafe { rasters(images, [std::ptr::null(); 2]) }?;
+    Ok(Pair::of_raw_frames(left, right)?)
+}
+
+/// # Safety
+/// As of [`pair`].
+unsafe fn rasters<'a>(
+    images: [*const Image; 2],
+    masks: [*const Image; 2],
+) -> Result<[Raster<'a>; 2], Failure> {
     const NAMES: [[&str; 2]; 2] =
         [["left image", "mask of the left image"], ["right image", "mask of the right image"]];
     let view = |i: usize| {
@@ -208,7 +229,7 @@ pub(crate) unsafe fn pair(images: [*const Image; 2], masks: [*const Image; 2]) -
         let mask = unsafe { mask.mask(mask_name) }?;
         raster.masked_by(mask).map_err(|error| Failure::argument(format!("the {mask_name}: {error}")))
     };
-    Ok(Pair::of_frames(view(0)?, view(1)?)?)
+    Ok([view(0)?, view(1)?])
 }
 
 /// Bytes of a row, and from the first byte of the first row to the last one of the last row.

@@ -1,7 +1,6 @@
 //! Rectified pairs of what two cameras saw.
 
 use std::ffi::c_void;
-use std::ptr;
 use std::sync::OnceLock;
 
 use mrfgs::image;
@@ -13,6 +12,7 @@ use crate::frame::{self, Image, Layout, Sample, extent};
 use crate::maps::put;
 use crate::status::{Failure, Status, call};
 use crate::warnings;
+use crate::words;
 
 /// How images as the cameras took them become a rectified pair. It is found once, and applied to any number of pairs.
 pub struct Rectification {
@@ -53,13 +53,13 @@ pub unsafe extern "C" fn mrfgs_rectification_new(
     let find = || {
         // SAFETY: the caller promises that the pointer is null or good.
         let calibration = unsafe { argument::thing("calibration", calibration) }?;
-        let size = match (width, height) {
-            (0, 0) => calibration.0.size.ok_or_else(|| {
+        let sizes = match (width, height) {
+            (0, 0) => calibration.0.sizes().ok_or_else(|| {
                 Failure::argument(
                     "the calibration does not say the size of the images: give width and height",
                 )
             })?,
-            size => (size.0 as usize, size.1 as usize),
+            size => [(size.0 as usize, size.1 as usize); 2],
         };
         if alpha.is_nan() || alpha > 1.0 {
             return Err(Failure::argument(format!(
@@ -68,8 +68,8 @@ pub unsafe extern "C" fn mrfgs_rectification_new(
         }
         let options =
             Options { alpha: Some(alpha).filter(|alpha| *alpha >= 0.0), zero_disparity: zero_disparity != 0 };
-        let by = mrfgs::rectification::Rectification::new(&calibration.0, size, &options)?;
-        warnings::say(by.doubts().iter().map(ToString::to_string));
+        let by = mrfgs::rectification::Rectification::of_sizes(&calibration.0, sizes, &options)?;
+        warnings::say(by.doubts().iter().map(words::doubt));
         Ok(Rectification::of(by))
     };
     // SAFETY: the caller promises that a pointer can be written there.
@@ -104,7 +104,7 @@ pub unsafe extern "C" fn mrfgs_rectify(
         // SAFETY: the caller promises that the pointer is null or good.
         let rectification = unsafe { argument::thing("rectification", rectification) }?;
         // SAFETY: the caller promises that the images are what their fields say until this returns.
-        let pair = unsafe { frame::pair([left, right], [ptr::null(); 2]) }?;
+        let pair = unsafe { frame::raw_pair([left, right]) }?;
         // SAFETY: the caller promises that the pointer is null or good.
         let left = unsafe { argument::thing("left view", left_view) }?;
         // SAFETY: the same.

@@ -4,12 +4,15 @@ use std::ffi::c_char;
 
 use mrfgs::depth;
 use mrfgs::image::calib::{self, Camera, Unit};
+use mrfgs::rectification::Doubt;
 
 use crate::argument;
 use crate::calibration::Calibration;
 use crate::maps;
 use crate::rectification::Rectification;
 use crate::status::{Failure, Status, call};
+use crate::warnings;
+use crate::words;
 
 /// The cameras of a rectified pair: from disparities to depths.
 pub struct Rig {
@@ -77,7 +80,10 @@ pub unsafe extern "C" fn mrfgs_rig_of_calibration(
                  rectified pair",
             )
         })?;
-        Ok(Rig::of(&rectified)?)
+        let rig = Rig::of(&rectified)?;
+        let doubts = Doubt::about(&rectified, rig.size.map(|(width, _)| width));
+        warnings::say(doubts.iter().map(words::doubt));
+        Ok(rig)
     };
     // SAFETY: the caller promises that a pointer can be written there.
     unsafe { argument::make("rig", rig, make) }

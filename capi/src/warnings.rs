@@ -44,8 +44,8 @@ pub unsafe extern "C" fn mrfgs_check_masked(
 }
 
 /// What the last mrfgs_check() of this thread has found to be probably wrong, or the last mrfgs_match(), which sees whether many
-/// disparities are at an end of the range, or the last mrfgs_rectification_new(), which sees whether the calibration is of other images; a
-/// line for each, "" where all seems well. It stays until the next one that succeeds.
+/// disparities are at an end of the range, or the last mrfgs_rectification_new() or mrfgs_rig_of_calibration(), which see whether the
+/// calibration is of other images or in another unit; a line for each, "" where all seems well. It stays until the next one that succeeds.
 #[unsafe(no_mangle)]
 pub extern "C" fn mrfgs_last_warnings() -> *const c_char {
     LAST.with(Said::text)

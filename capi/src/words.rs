@@ -2,6 +2,7 @@
 
 use mrfgs::Error;
 use mrfgs::check::Warning;
+use mrfgs::rectification::Doubt;
 use mrfgs::remedy::{self, Words};
 
 const WORDS: Words = Words {
@@ -13,12 +14,19 @@ const WORDS: Words = Words {
     cpu: "set mrfgs_options_device(options, \"cpu\")",
     memory: Some(["option \"memory\"", ""]),
     mask: Some("give alpha 0 to what is no image"),
+    unit: Some("state the right one by mrfgs_calibration_unit()"),
+    crop: Some("mrfgs_calibration_crop()"),
     ..Words::PLAIN
 };
 
 /// An error with its remedy.
 pub(crate) fn error(error: &Error) -> String {
     remedy::error(error, &WORDS)
+}
+
+/// A doubt about a calibration, with its remedy.
+pub(crate) fn doubt(doubt: &Doubt) -> String {
+    remedy::doubt(doubt, &WORDS)
 }
 
 /// A warning with its remedy.

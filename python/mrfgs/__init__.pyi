@@ -149,9 +149,13 @@ class MatchedSequence(Iterator[Matched]):
 class Calibration:
     """What is known of a pair of cameras, read from the files of OpenCV, ROS, Kalibr or Middlebury."""
 
-    def __new__(cls, *files: _Path, unit: str | None = None) -> Calibration: ...
+    def __new__(
+        cls, *files: _Path, unit: str | None = None, crop: tuple[int, int, int, int] | None = None
+    ) -> Calibration: ...
     @staticmethod
-    def of_texts(*texts: str, unit: str | None = None) -> Calibration:
+    def of_texts(
+        *texts: str, unit: str | None = None, crop: tuple[int, int, int, int] | None = None
+    ) -> Calibration:
         """The same of the texts of such files: one, or two that belong together."""
     @property
     def size(self) -> tuple[int, int] | None:

@@ -220,6 +220,27 @@ pub(crate) fn pair(
     mask: Option<&Bound<PyAny>>,
     no_data: Option<f64>,
 ) -> PyResult<Pair> {
+    let [left, right] = rasters(left, right, mask, no_data)?;
+    Pair::of_frames(left, right).map_err(exception)
+}
+
+/// The same of images as two cameras took them, which may differ in size.
+pub(crate) fn raw_pair(
+    left: &Image,
+    right: &Image,
+    mask: Option<&Bound<PyAny>>,
+    no_data: Option<f64>,
+) -> PyResult<Pair> {
+    let [left, right] = rasters(left, right, mask, no_data)?;
+    Pair::of_raw_frames(left, right).map_err(exception)
+}
+
+fn rasters<'a>(
+    left: &'a Image,
+    right: &'a Image,
+    mask: Option<&Bound<PyAny>>,
+    no_data: Option<f64>,
+) -> PyResult<[Raster<'a>; 2]> {
     let mask = mask.map(self::mask).transpose()?;
     let rasters = [left.raster()?, right.raster()?].map(|raster| match no_data {
         Some(value) => raster.without(value),
@@ -230,7 +251,7 @@ pub(crate) fn pair(
         Some(mask) => left.and_then(|left| left.masked_by(mask)),
         None => left,
     };
-    left.and_then(|left| Pair::of_frames(left, right?)).map_err(exception)
+    left.and_then(|left| Ok([left, right?])).map_err(exception)
 }
 
 /// How an image is stored in an array.

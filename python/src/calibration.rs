@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use mrfgs::Error;
 use mrfgs::calibration;
 use mrfgs::calibration::cameras::StereoCalibration;
+use mrfgs::image::Rect;
 use mrfgs::image::calib::Unit;
 use pyo3::exceptions::{PyFileNotFoundError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -19,6 +20,8 @@ use crate::words;
 ///     D1, K2, D2, R, T, or R1, R2, P1, P2 too), ROS's camera_info of both cameras in any order, Kalibr's camera chain (cam0 is the
 ///     left camera), a file of EuRoC, KITTI, ORB-SLAM3, VINS-Fusion, Basalt, ZED, OAK or COLMAP, or Middlebury's calib.txt.
 /// unit: the unit of the baseline, "mm", "cm" or "m", where the files do not say it or say it wrong.
+/// crop: (x, y, width, height) of the part of the calibrated images that the images show, as it is or scaled, in pixels; None where they
+///     show all, or for OAK cameras their middle.
 ///
 /// Rectification and Rig take it; they take paths, too. Raises FileNotFoundError for a file that is not there, and ValueError for
 /// one that makes no sense.
@@ -28,9 +31,12 @@ pub(crate) struct PyCalibration {
     pub(crate) cameras: StereoCalibration,
     /// The files, as messages name them.
     pub(crate) names: String,
-    /// What it was made of, for copies: the name and the text of each file, and the unit that was given.
-    made_of: (Vec<(String, String)>, Option<String>),
+    /// What it was made of, for copies: the name and the text of each file, and the unit and the part that were given.
+    made_of: (Vec<(String, String)>, Option<String>, Option<Part>),
 }
+
+/// First column and row, width and height.
+type Part = (usize, usize, usize, usize);
 
 impl PyCalibration {
     /// What is given for `calibration`: a calibration, a path, or several.
@@ -41,13 +47,17 @@ impl PyCalibration {
         match given.try_iter() {
             // What is one path counts as such, even where it has parts.
             Ok(files) if given.extract::<PathBuf>().is_err() => {
-                Self::read(files.collect::<PyResult<Vec<_>>>()?.into_iter(), None)
+                Self::read(files.collect::<PyResult<Vec<_>>>()?.into_iter(), None, None)
             }
-            _ => Self::read(std::iter::once(given.clone()), None),
+            _ => Self::read(std::iter::once(given.clone()), None, None),
         }
     }
 
-    fn read<'py>(files: impl Iterator<Item = Bound<'py, PyAny>>, unit: Option<&str>) -> PyResult<Self> {
+    fn read<'py>(
+        files: impl Iterator<Item = Bound<'py, PyAny>>,
+        unit: Option<&str>,
+        crop: Option<Part>,
+    ) -> PyResult<Self> {
         let files = files.map(|file| {
             let path: PathBuf = file.extract().map_err(|error| {
                 let reason = "calibration: give the path of a file, or those of two, or a Calibration";
@@ -71,11 +81,11 @@ impl PyCalibration {
             let text = calibration::text(&path).map_err(exception)?;
             Ok((path.display().to_string(), text))
         });
-        Self::of_named(texts.collect::<PyResult<_>>()?, unit)
+        Self::of_named(texts.collect::<PyResult<_>>()?, unit, crop)
     }
 
     /// That of the texts of files, each with the name by which messages call it.
-    fn of_named(files: Vec<(String, String)>, unit: Option<&str>) -> PyResult<Self> {
+    fn of_named(files: Vec<(String, String)>, unit: Option<&str>, crop: Option<Part>) -> PyResult<Self> {
         let texts: Vec<_> = files.iter().map(|(name, text)| (Path::new(name), text.clone())).collect();
         let mut cameras = calibration::of_texts(&texts).map_err(|error| match error {
             Error::Calibration(_) => {
@@ -87,7 +97,12 @@ impl PyCalibration {
             cameras.set_unit(self::unit(text)?);
         }
         let names = files.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
-        Ok(Self { cameras, names, made_of: (files, unit.map(str::to_owned)) })
+        if let Some((x, y, width, height)) = crop {
+            let part = Rect { x: x..x.saturating_add(width), y: y..y.saturating_add(height) };
+            let error = |error| PyValueError::new_err(format!("crop: {names}: {error}"));
+            cameras = cameras.of_part(&part).map_err(error)?;
+        }
+        Ok(Self { cameras, names, made_of: (files, unit.map(str::to_owned), crop) })
     }
 
     /// An error of what the calibration says, with its name.
@@ -107,18 +122,18 @@ pub(crate) fn unit(text: &str) -> PyResult<Unit> {
 #[pymethods]
 impl PyCalibration {
     #[new]
-    #[pyo3(signature = (*files, unit=None))]
-    fn new(files: &Bound<PyTuple>, unit: Option<&str>) -> PyResult<Self> {
-        Self::read(files.iter(), unit)
+    #[pyo3(signature = (*files, unit=None, crop=None))]
+    fn new(files: &Bound<PyTuple>, unit: Option<&str>, crop: Option<Part>) -> PyResult<Self> {
+        Self::read(files.iter(), unit, crop)
     }
 
     /// The same of the texts of such files: one, or two that belong together. Messages call them "the text", or "text 1" and
     /// "text 2".
     #[staticmethod]
-    #[pyo3(signature = (*texts, unit=None))]
-    fn of_texts(texts: Vec<String>, unit: Option<&str>) -> PyResult<Self> {
+    #[pyo3(signature = (*texts, unit=None, crop=None))]
+    fn of_texts(texts: Vec<String>, unit: Option<&str>, crop: Option<Part>) -> PyResult<Self> {
         let name = |i: usize| if texts.len() == 1 { "the text".into() } else { format!("text {}", i + 1) };
-        Self::of_named((0..).map(name).zip(texts.clone()).collect(), unit)
+        Self::of_named((0..).map(name).zip(texts.clone()).collect(), unit, crop)
     }
 
     /// (width, height) of the images as the cameras took them; None where the files do not say it.
@@ -149,13 +164,18 @@ impl PyCalibration {
 
     /// How `pickle` and `copy` make another one: of the texts, as the files may be gone by then.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let (files, unit) = &self.made_of;
+        let (files, unit, crop) = &self.made_of;
         let again = py.get_type::<Self>().getattr("_again")?;
-        Ok((again, (files.clone(), unit.as_deref()).into_pyobject(py)?))
+        Ok((again, (files.clone(), unit.as_deref(), *crop).into_pyobject(py)?))
     }
 
     #[classmethod]
-    fn _again(_: &Bound<PyType>, files: Vec<(String, String)>, unit: Option<&str>) -> PyResult<Self> {
-        Self::of_named(files, unit)
+    fn _again(
+        _: &Bound<PyType>,
+        files: Vec<(String, String)>,
+        unit: Option<&str>,
+        crop: Option<Part>,
+    ) -> PyResult<Self> {
+        Self::of_named(files, unit, crop)
     }
 }

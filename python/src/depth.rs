@@ -7,6 +7,7 @@ use mrfgs::depth::Rig;
 use mrfgs::image::calib::{Calibration, Camera, Unit};
 use mrfgs::image::cloud::{Cloud, Point};
 use mrfgs::image::{Pair, Plane, write};
+use mrfgs::rectification::Doubt;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -14,9 +15,10 @@ use pyo3::types::{PyTuple, PyType};
 
 use crate::arrays::{self, Image};
 use crate::calibration::{self, PyCalibration};
-use crate::exceptions::exception;
+use crate::exceptions::{self, exception};
 use crate::matched::PyMatched;
 use crate::third::PyThirdCamera;
+use crate::words;
 
 /// The cameras of a rectified pair: from disparities to depths and points.
 ///
@@ -114,11 +116,17 @@ impl PyRig {
     }
 }
 
+/// Says what is probably wrong with the calibration of a rectified pair.
+fn tell(py: Python, rectified: &Calibration, size: Option<(usize, usize)>, names: &str) -> PyResult<()> {
+    let doubts = Doubt::about(rectified, size.map(|(width, _)| width));
+    exceptions::tell(py, doubts.iter().map(|doubt| words::doubt(doubt, names)))
+}
+
 #[pymethods]
 impl PyRig {
     #[new]
     #[pyo3(signature = (calibration, *, size=None))]
-    fn new(calibration: &Bound<PyAny>, size: Option<(usize, usize)>) -> PyResult<Self> {
+    fn new(py: Python, calibration: &Bound<PyAny>, size: Option<(usize, usize)>) -> PyResult<Self> {
         let known = PyCalibration::of(calibration)?;
         let rectified = known.cameras.of_rectified_images(size).map_err(|error| known.wrong(error))?;
         let rectified = rectified.ok_or_else(|| {
@@ -128,7 +136,9 @@ impl PyRig {
                 known.names
             ))
         })?;
-        Self::of_rectified(&rectified, None, &known)
+        let made = Self::of_rectified(&rectified, None, &known)?;
+        tell(py, &rectified, made.size, &known.names)?;
+        Ok(made)
     }
 
     /// That of a rectified pair whose cameras no file describes: by their focal length and the distance between them.
@@ -142,7 +152,9 @@ impl PyRig {
     /// unit: the unit of the baseline, "mm", "cm" or "m"; `millimetres` takes it.
     #[staticmethod]
     #[pyo3(signature = (focal, baseline, *, principal_point=None, doffs=0.0, size=None, unit="unknown"))]
+    #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn of(
+        py: Python,
         focal: f64,
         baseline: f64,
         principal_point: Option<[f64; 2]>,
@@ -169,8 +181,12 @@ impl PyRig {
                 "principal_point and doffs: give numbers, not {value}"
             )));
         }
-        let unit = calibration::unit(unit)?.name().into();
-        let names = "Rig.of".into();
+        let unit = calibration::unit(unit)?;
+        let names = "Rig.of".to_owned();
+        let rectified =
+            Calibration::of_cameras(Camera { focal_length: [focal; 2], principal_point }, baseline, unit);
+        tell(py, &rectified, size, &names)?;
+        let unit = unit.name().into();
         Self::of_numbers(([focal; 2], principal_point, [doffs, baseline], unit, size, names, None))
     }
 

@@ -13,11 +13,12 @@ use crate::arrays::{self, Image};
 use crate::calibration::PyCalibration;
 use crate::depth::PyRig;
 use crate::exceptions::{self, exception};
+use crate::words;
 
 /// How images as the cameras took them become a rectified pair. It is found once, and applied to any number of pairs.
 ///
 /// calibration: a Calibration, the path of a calibration file, or a list of the paths of two.
-/// size: (width, height) of the images, in pixels; None takes that of the calibration.
+/// size: (width, height) of the images, in pixels; None takes that of the calibration, whose cameras may have images of two sizes.
 /// alpha: from 0, where every pixel of the rectified views has a source, to 1, where no pixel of the images is lost. None takes the
 ///     rectification of the calibration where it has one, else one that keeps the focal length (fisheyes: 0).
 /// zero_disparity: whether both views have the same principal point, so that what is infinitely far has a disparity of 0.
@@ -31,7 +32,7 @@ pub(crate) struct PyRectification {
     /// The same with its places, from the first pair on.
     kept: OnceLock<Rectification>,
     /// What it was made of, for copies: calibration or matches, the size of the images, and the options.
-    made_of: (Source, (usize, usize), Options),
+    made_of: (Source, [(usize, usize); 2], Options),
     /// How its right camera has turned since, one turn after the other.
     turns: Vec<[f64; 3]>,
     /// What is known of the rectified pair, unless it comes from matches alone.
@@ -47,23 +48,24 @@ enum Source {
 }
 
 impl PyRectification {
-    fn of(py: Python, source: Source, size: (usize, usize), options: Options) -> PyResult<Self> {
+    fn of(py: Python, source: Source, sizes: [(usize, usize); 2], options: Options) -> PyResult<Self> {
         let (by, known) = match &source {
             Source::Calibration(known) => {
-                let by =
-                    Rectification::new(&known.cameras, size, &options).map_err(|error| known.wrong(error))?;
+                let by = Rectification::of_sizes(&known.cameras, sizes, &options)
+                    .map_err(|error| known.wrong(error))?;
                 let calibration = by.calibration().map_err(|error| known.wrong(error))?;
                 let [rectifying, _] = *by.rotations();
                 let rig = Py::new(py, PyRig::of_rectified(&calibration, Some(rectifying), known)?)?;
                 (by, Some((calibration, rig)))
             }
             Source::Matches(matches) => {
-                let by =
-                    py.detach(|| Rectification::of_matches(matches, size, &options)).map_err(exception)?;
+                let by = py
+                    .detach(|| Rectification::of_matches(matches, sizes[0], &options))
+                    .map_err(exception)?;
                 (by, None)
             }
         };
-        Ok(Self { by, kept: OnceLock::new(), made_of: (source, size, options), turns: Vec::new(), known })
+        Ok(Self { by, kept: OnceLock::new(), made_of: (source, sizes, options), turns: Vec::new(), known })
     }
 
     /// The same of a rig whose right camera has turned about this axis, as long as the angle.
@@ -116,18 +118,18 @@ impl PyRectification {
     ) -> PyResult<Self> {
         let options = options(alpha, zero_disparity)?;
         let known = PyCalibration::of(calibration)?;
-        let size = match size {
-            Some(size) => arrays::size(size)?,
-            None => known.cameras.size.ok_or_else(|| {
+        let sizes = match size {
+            Some(size) => [arrays::size(size)?; 2],
+            None => known.cameras.sizes().ok_or_else(|| {
                 let names = &known.names;
                 PyValueError::new_err(format!(
                     "size: {names} does not say the size of the images; give (width, height)"
                 ))
             })?,
         };
-        let made = Self::of(py, Source::Calibration(known), size, options)?;
+        let made = Self::of(py, Source::Calibration(known), sizes, options)?;
         if let Source::Calibration(PyCalibration { names, .. }) = &made.made_of.0 {
-            exceptions::tell(py, made.by.doubts().iter().map(|doubt| format!("{names}: {doubt}")))?;
+            exceptions::tell(py, made.by.doubts().iter().map(|doubt| words::doubt(doubt, names)))?;
         }
         Ok(made)
     }
@@ -158,7 +160,7 @@ impl PyRectification {
         let [left, right] = Image::both(left, right)?;
         let pair = arrays::pair(&left, &right, mask, no_data)?;
         let matches = py.detach(|| Rectification::matches_of(&pair)).map_err(exception)?;
-        let made = Self::of(py, Source::Matches(matches), pair.size(), options)?;
+        let made = Self::of(py, Source::Matches(matches), pair.own_sizes(), options)?;
         exceptions::tell(py, made.by.doubts().iter().map(ToString::to_string))?;
         Ok(made)
     }
@@ -184,7 +186,7 @@ impl PyRectification {
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let [left, right] = Image::both(left, right)?;
         let stored = [left.stored(&right), right.stored(&left)];
-        let pair = arrays::pair(&left, &right, mask, no_data)?;
+        let pair = arrays::raw_pair(&left, &right, mask, no_data)?;
         let pair = py.detach(|| self.with_places()?.apply(&pair)).map_err(exception)?;
         let [left, right] = arrays::images(py, &pair, stored)?;
         Ok((left, right))
@@ -204,10 +206,10 @@ impl PyRectification {
         self.by.size()
     }
 
-    /// (width, height) of the images that it rectifies, in pixels.
+    /// (width, height) of the left images that it rectifies, in pixels; that of the right ones may be another.
     #[getter]
     fn raw_size(&self) -> (usize, usize) {
-        self.made_of.1
+        self.made_of.1[0]
     }
 
     /// The rotations from the frame of each camera to that of its rectified view: two arrays (3, 3), left and right, R1 and R2 of
@@ -258,10 +260,10 @@ impl PyRectification {
 
     /// How `pickle` and `copy` make another one. It is found again: the same calibration or matches give the same bits everywhere.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let (source, size, Options { alpha, zero_disparity }) = self.made_of.clone();
+        let (source, sizes, Options { alpha, zero_disparity }) = self.made_of.clone();
         let again = py.get_type::<Self>().getattr("_again")?;
         let turns = self.turns.clone();
-        Ok((again, (source, size, alpha, zero_disparity, turns).into_pyobject(py)?))
+        Ok((again, (source, sizes, alpha, zero_disparity, turns).into_pyobject(py)?))
     }
 
     /// As the constructor, without saying a second time what is probably wrong.
@@ -269,12 +271,12 @@ impl PyRectification {
     fn _again(
         of: &Bound<PyType>,
         source: Source,
-        size: (usize, usize),
+        sizes: [(usize, usize); 2],
         alpha: Option<f64>,
         zero_disparity: bool,
         turns: Vec<[f64; 3]>,
     ) -> PyResult<Self> {
-        let made = Self::of(of.py(), source, size, Options { alpha, zero_disparity })?;
+        let made = Self::of(of.py(), source, sizes, Options { alpha, zero_disparity })?;
         turns.into_iter().try_fold(made, |made, axis| made.with_right_turned(of.py(), axis))
     }
 }

@@ -2,6 +2,7 @@
 
 use mrfgs::Error;
 use mrfgs::check::Warning;
+use mrfgs::rectification::Doubt;
 use mrfgs::remedy::{self, Words};
 
 const WORDS: Words = Words {
@@ -13,6 +14,8 @@ const WORDS: Words = Words {
     memory: Some(["memory", "MiB"]),
     mask: Some("give a mask of what is no image"),
     rectify: Some("Rectification.of_pair()"),
+    unit: Some("state the right one by Calibration(..., unit=\"m\") or Rig.of(..., unit=\"m\")"),
+    crop: Some("Calibration(..., crop=(x, y, width, height))"),
     ..Words::PLAIN
 };
 
@@ -25,9 +28,17 @@ pub(crate) fn error(error: &Error) -> String {
 pub(crate) fn calibration(error: &Error, names: &str) -> Option<String> {
     match error {
         Error::Calibration(_) => Some(format!("{names}: {error}")),
-        Error::Mismatch(cause) => Some(format!("{names}: {cause}; size is (width, height)")),
+        Error::Mismatch(cause) => Some(format!(
+            "{names}: {cause}; size is (width, height), and Calibration(..., crop=(x, y, width, height)) says which part of the calibrated \
+             images others show"
+        )),
         _ => None,
     }
+}
+
+/// A doubt about what the calibration of the files `names` says, with its remedy.
+pub(crate) fn doubt(doubt: &Doubt, names: &str) -> String {
+    format!("{names}: {}", remedy::doubt(doubt, &WORDS))
 }
 
 /// A warning with its remedy.

@@ -1139,14 +1139,35 @@ class Rectification(Folder):
             self.assertLessEqual(np.abs(rig.millimetres(disparity) - expected).max(), 1)
         self.refused(ValueError, "unit: give mm, cm, m or unknown, not \"feet\"", lambda: mrfgs.Calibration(CAMERAS, unit="feet"))
 
+    def test_what_is_taken_otherwise_is_a_warning(self):
+        text = CAMERAS.read_text()
+        of_texts = mrfgs.Calibration.of_texts
+        swapped = text.replace("data: [ -0.16356857928250576", "data: [ 0.16356857928250576")
+        self.assertNotEqual(swapped, text)
+        for words, call in (
+            ("the right camera on the left of the left one, so each was taken", lambda: mrfgs.Rectification(of_texts(swapped))),
+            ("those of 480 x 360 count as the same, scaled; .*crop=", lambda: mrfgs.Rectification(CAMERAS, (480, 360))),
+            ("mm apart.*unit=", lambda: mrfgs.Rectification(of_texts(text, unit="mm"))),
+            ("120 m apart.*Rig.of", lambda: mrfgs.Rig.of(700, 120, size=(640, 480), unit="m")),
+            ("4 px.*in pixels", lambda: mrfgs.Rig.of(4, 120, size=(640, 480), unit="mm")),
+        ):
+            with self.assertWarnsRegex(mrfgs.MatchWarning, words):
+                call()
+        # A part is what the caller says, and a copy knows it.
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", mrfgs.MatchWarning)
+            part = of_texts(text, crop=(0, 20, 240, 140))
+            self.assertEqual(pickle.loads(pickle.dumps(part)).size, (240, 140))
+            by = mrfgs.Rectification(part)
+            self.assertEqual(by.raw_size, (240, 140))
+            mrfgs.Rig.of(700, 120, size=(640, 480), unit="mm")
+
     def test_what_makes_no_sense_is_an_exception(self):
         left, right = raw_pair()
         by = mrfgs.Rectification(CAMERAS)
         text = CAMERAS.read_text()
         of_texts = mrfgs.Calibration.of_texts
         sizeless = of_texts(text.replace("imageSize: [ 240, 180 ]\n", ""))
-        swapped = text.replace("data: [ -0.16356857928250576", "data: [ 0.16356857928250576")
-        self.assertNotEqual(swapped, text)
         for error, words, call in (
             (FileNotFoundError, "nowhere.yml: there is no such file", lambda: mrfgs.Rectification("nowhere.yml")),
             (FileNotFoundError, "nowhere.txt", lambda: mrfgs.Rig("nowhere.txt")),
@@ -1162,7 +1183,8 @@ class Rectification(Folder):
             (ValueError, "one too many", lambda: mrfgs.Calibration(CAMERAS, CAMERAS, CAMERAS, CAMERAS)),
             (ValueError, "the text: K1", lambda: of_texts(text.replace("214.0, 0.0, 121.4", "wide, 0.0, 121.4"))),
             (ValueError, "the text: R is missing", lambda: mrfgs.Rectification(of_texts(text.split("R: ")[0]), (240, 180))),
-            (ValueError, "right camera on the left", lambda: mrfgs.Rectification(of_texts(swapped))),
+            (ValueError, "crop: the text: the calibration is for images of 240 x 180",
+             lambda: of_texts(text, crop=(0, 1, 240, 180))),
             (ValueError, "cameras.yml: the calibration is for images of 240 x 180 and these are 180 x 240; size is (width, height)",
              lambda: mrfgs.Rectification(CAMERAS, (180, 240))),
             (ValueError, "size: the text does not say the size of the images; give (width, height)", lambda: mrfgs.Rectification(sizeless)),
@@ -1174,7 +1196,7 @@ class Rectification(Folder):
             (ValueError, "alpha: give a number from 0 to 1, not 1.5", lambda: mrfgs.Rectification(CAMERAS, alpha=1.5)),
             (ValueError, "alpha", lambda: mrfgs.Rectification(CAMERAS, alpha=float("nan"))),
             (ValueError, "240 x 180 and these are 239 x 180", lambda: by.apply(left[:, 1:], right[:, 1:])),
-            (ValueError, "one size", lambda: by.apply(left, right[:, 1:])),
+            (ValueError, "240 x 180 and these are 239 x 180", lambda: by.apply(left, right[:, 1:])),
             (TypeError, "left: give an array of whole numbers", lambda: by.apply(left > 9, right)),
             (TypeError, "right", lambda: by.apply(left, "right.png")),
             (ValueError, "mask", lambda: by.apply(left, right, mask=np.zeros((3, 3), bool))),

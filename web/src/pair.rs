@@ -21,6 +21,8 @@ pub struct StereoPair {
     pub(crate) pair: Pair,
     /// What has rectified it, where it was not.
     pub(crate) by: Option<By>,
+    /// The distance of the principal points along the row, in pixels, where a calibration has rectified it.
+    pub(crate) doffs: Option<f64>,
 }
 
 #[wasm_bindgen]
@@ -33,7 +35,7 @@ impl StereoPair {
     pub fn new(left: &[u8], left_name: &str, right: &[u8], right_name: &str) -> Thrown<Self> {
         let files = ((Path::new(left_name), left), (Path::new(right_name), right));
         let reader = Reader { orient: true, ..Reader::default() };
-        Ok(Self { pair: reader.pair_in_memory(files.0, files.1).map_err(thrown)?, by: None })
+        Ok(Self { pair: reader.pair_in_memory(files.0, files.1).map_err(thrown)?, by: None, doffs: None })
     }
 
     /// The pair in memory: rows of grey, grey and alpha, RGB or RGBA without gaps, as many channels as the samples are for.
@@ -90,7 +92,11 @@ impl StereoPair {
     /// # Errors
     /// Where there is not enough memory.
     pub fn range(&self) -> Thrown<Option<Range>> {
-        match check::range(&self.pair) {
+        let found = match self.doffs {
+            Some(doffs) => check::range_of_cameras(&self.pair, doffs),
+            None => check::range(&self.pair),
+        };
+        match found {
             Ok(range) => Ok(Some(Range { range, found: true })),
             Err(Error::Range(RangeError::NotFound { .. } | RangeError::NotRectified)) => Ok(None),
             Err(error) => Err(thrown(error)),
@@ -113,7 +119,7 @@ fn of_samples<S: Sample>(left: (&[S], (usize, usize)), right: (&[S], (usize, usi
         Raster::new(width, height, channels, S::samples(Cow::Borrowed(samples)))
     }
     let pair = view(left).and_then(|left| Pair::of_frames(left, view(right)?));
-    Ok(StereoPair { pair: pair.map_err(thrown)?, by: None })
+    Ok(StereoPair { pair: pair.map_err(thrown)?, by: None, doffs: None })
 }
 
 /// Disparities to search, in pixels, both ends included.

@@ -2,7 +2,7 @@
 
 use crate::Thrown;
 use crate::pair::{Cameras, StereoPair};
-use crate::words::{By, thrown};
+use crate::words::{By, doubt, thrown};
 use mrfgs::calibration::{self, cameras::StereoCalibration};
 use mrfgs::rectification::{Options, Rectification};
 use std::path::Path;
@@ -68,9 +68,11 @@ impl Known {
     /// # Errors
     /// Where the calibration lacks what this takes, or is for images of another size.
     pub fn rectify(&self, pair: &StereoPair) -> Thrown<Rectified> {
-        let by = Rectification::new(&self.known, pair.pair.size(), &Options::default()).map_err(thrown)?;
-        let cameras = Cameras::of(&by.calibration().map_err(thrown)?)?;
+        let by = Rectification::for_pair(&self.known, &pair.pair, &Options::default()).map_err(thrown)?;
+        let calibration = by.calibration().map_err(thrown)?;
+        let cameras = Cameras::of(&calibration)?;
         let mut rectified = Rectified::new(&by, pair, By::Calibration)?;
+        rectified.pair.doffs = calibration.doffs;
         rectified.notes.insert(0, format!("rectified by {}", self.names));
         Ok(Rectified { cameras: Some(cameras), ..rectified })
     }
@@ -121,7 +123,7 @@ impl Rectified {
 impl Rectified {
     fn new(by: &Rectification, pair: &StereoPair, what: By) -> Thrown<Self> {
         let rectified = by.apply(&pair.pair).map_err(thrown)?;
-        let notes = by.doubts().iter().map(ToString::to_string).collect();
-        Ok(Self { pair: StereoPair { pair: rectified, by: Some(what) }, cameras: None, notes })
+        let notes = by.doubts().iter().map(doubt).collect();
+        Ok(Self { pair: StereoPair { pair: rectified, by: Some(what), doffs: None }, cameras: None, notes })
     }
 }

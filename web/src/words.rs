@@ -2,6 +2,7 @@
 
 use mrfgs::Error;
 use mrfgs::check::Warning;
+use mrfgs::rectification::Doubt;
 use mrfgs::remedy::{self, Words};
 use std::cell::Cell;
 use wasm_bindgen::JsValue;
@@ -15,6 +16,7 @@ const PAGE: Words = Words {
     range: Some("disparity range"),
     cpu: "use the program in place of the browser",
     driver: ["take one that has WebGPU", "update its driver or the browser"],
+    unit: Some("choose the right one in the tab Points"),
     ..Words::PLAIN
 };
 
@@ -53,6 +55,11 @@ pub(crate) fn thrown(error: impl Into<Error>) -> js_sys::Error {
 /// An error with its remedy.
 pub(crate) fn error(error: &Error) -> String {
     remedy::error(error, WORDS.get())
+}
+
+/// A doubt about a rectification, with its remedy.
+pub(crate) fn doubt(doubt: &Doubt) -> String {
+    remedy::doubt(doubt, WORDS.get())
 }
 
 /// A warning of `pair` or of its maps as `{ text, remedy }`: with what helps in words, and where the page can do it, as "swap", "rectify"

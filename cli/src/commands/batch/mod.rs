@@ -367,8 +367,9 @@ mod tests {
     }
 
     /// For every flag: command lines without and with it, or with another value of it; and whether that changes a byte of an output.
-    const FLAGS: [(&str, &str, &str, bool); 20] = [
+    const FLAGS: [(&str, &str, &str, bool); 21] = [
         ("calib", "--calib one.yml --also depth", "--calib two.yml --also depth", true),
+        ("calib-crop", "--calib one.yml", "--calib one.yml --calib-crop 0,0,320,200", true),
         ("rectify", "--calib one.yml", "--calib one.yml --rectify", true),
         ("alpha", "--calib one.yml --rectify", "--calib one.yml --rectify --alpha 0.5", true),
         ("format", "", "--format tif", true),
