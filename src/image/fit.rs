@@ -29,7 +29,7 @@ impl Fit {
         let rounded =
             (width * scale[1] - size.0 as f64).abs() < 1.0 || (height * scale[0] - size.1 as f64).abs() < 1.0;
         let fits = exact || rounded && (scale[0] - 1.0).abs() > LEAST;
-        (fits && scale.iter().all(|scale| *scale > 0.0)).then_some(Self {
+        (fits && scale.iter().all(|scale| scale.is_finite() && *scale > 0.0)).then_some(Self {
             calibrated,
             size,
             origin: [0.0; 2],
