@@ -109,15 +109,15 @@ fn run() -> Result<(), Failure> {
     };
     match cli.command {
         Command::Demo(args) => demo::run(&args)?,
-        Command::Match(args) => r#match::run(&args)?,
-        Command::Rectify(args) => rectify::run(&args)?,
+        Command::Match(args) => r#match::run(args)?,
+        Command::Rectify(args) => rectify::run(args)?,
         Command::Depth(args) => depth::run(&args)?,
         Command::Sequence(args) => sequence::run(&args)?,
         Command::Ros(args) => ros::run(&args)?,
         Command::Batch(args) => batch::run(&args)?,
         Command::Evaluate(args) => evaluate::run(&args)?,
         Command::Bench(args) => bench::run(&args)?,
-        Command::Inspect(args) => inspect::run(&args)?,
+        Command::Inspect(args) => inspect::run(args)?,
         Command::Devices => devices::run()?,
         Command::Presets(args) => presets::run(&args)?,
         Command::Completions(args) => completions::run(&args, Cli::command())?,

@@ -14,14 +14,14 @@ use crate::error::ReadError;
 const MPO: &[u8] = b"MPF\0";
 const JPS: &[u8] = b"_JPSJPS_";
 
-/// The left and the right view in the file `bytes`, called `path`.
+/// The left and the right view in the file `bytes`, called `path`, and whether it says which one is the left one.
 pub(super) fn decode_both(
     path: &Path,
     bytes: &[u8],
     max_pixels: u64,
     no_data: Option<f64>,
     orient: bool,
-) -> Result<[Raster<'static>; 2], ReadError> {
+) -> Result<([Raster<'static>; 2], bool), ReadError> {
     let read = |bytes: &[u8]| {
         let raster = decode(bytes, max_pixels, no_data)?.named(path);
         if orient { Ok::<_, ReadError>(raster.upright()?) } else { Ok(raster) }
@@ -29,7 +29,7 @@ pub(super) fn decode_both(
     if let Some(views) = index(bytes)? {
         let [left, right] = views.map(|view| bytes.get(view).map(read));
         let cut = || damaged("a view is missing");
-        return Ok([left.ok_or_else(cut)??, right.ok_or_else(cut)??]);
+        return Ok(([left.ok_or_else(cut)??, right.ok_or_else(cut)??], true));
     }
     let Some(halves) = Halves::of(path, bytes)? else {
         return Err(
@@ -45,13 +45,16 @@ pub(super) fn decode_both(
     };
     let [first, second] =
         [first, second].map(|part| whole.crop(&part).map_err(|e| ReadError::from(e.to_string())));
-    Ok(if halves.left_first { [first?, second?] } else { [second?, first?] })
+    let views = if halves.left_first { [first?, second?] } else { [second?, first?] };
+    Ok((views, halves.is_said))
 }
 
 /// How the views lie in an image that holds both.
 struct Halves {
     above: bool,
     left_first: bool,
+    /// Whether the file says so.
+    is_said: bool,
 }
 
 impl Halves {
@@ -62,12 +65,12 @@ impl Halves {
         let Some((_, body)) = said else {
             let is_jps = bytes.starts_with(&[0xff, 0xd8])
                 && path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("jps"));
-            return Ok(is_jps.then_some(Self { above: false, left_first: false }));
+            return Ok(is_jps.then_some(Self { above: false, left_first: false, is_said: false }));
         };
         // Behind the name and two bytes: how far the views are apart, flags, the layout, and whether it is a pair at all.
         match bytes[body].get(JPS.len() + 2..).and_then(<[u8]>::first_chunk) {
             Some(&[_, flags, layout @ (2 | 3), 1]) => {
-                Ok(Some(Self { above: layout == 3, left_first: flags & 4 != 0 }))
+                Ok(Some(Self { above: layout == 3, left_first: flags & 4 != 0, is_said: true }))
             }
             Some([.., 1]) => {
                 Err("holds both views mixed with each other; save them side by side, or as two files".into())
@@ -172,7 +175,9 @@ mod tests {
     }
 
     fn levels(path: &str, bytes: &[u8]) -> Result<[u8; 2], String> {
-        let views = decode_both(Path::new(path), bytes, 1 << 20, None, false).map_err(|e| e.to_string())?;
+        let (views, is_ordered) =
+            decode_both(Path::new(path), bytes, 1 << 20, None, false).map_err(|e| e.to_string())?;
+        assert_eq!(is_ordered, path != "a.jps");
         Ok(views.map(|view| {
             let Samples::Byte(samples) = view.samples() else { panic!("bytes") };
             samples[0]
@@ -211,6 +216,6 @@ mod tests {
         }
         let body = [JPS, &[0, 4, 0, 4, 3, 1]].concat();
         let views = decode_both(Path::new("a"), &jpeg(&[60, 200], Some((0xe3, &body))), 1 << 20, None, false);
-        assert_eq!(views.unwrap().map(|view| view.size()), [(16, 4); 2]);
+        assert_eq!(views.unwrap().0.map(|view| view.size()), [(16, 4); 2]);
     }
 }

@@ -408,6 +408,18 @@ impl Pair {
         Self { doubts: other.doubts.clone(), ..self }
     }
 
+    /// The pair with the right view in the place of the left one.
+    #[must_use]
+    pub fn exchanged(mut self) -> Self {
+        std::mem::swap(&mut self.left, &mut self.right);
+        self.georeferences.swap(0, 1);
+        self.orientations.swap(0, 1);
+        self.doubts.swap(0, 1);
+        self.own_sizes.swap(0, 1);
+        self.full = self.full.map(|full| Box::new(full.exchanged()));
+        self
+    }
+
     /// The reference view.
     #[must_use]
     pub fn left(&self) -> &Image {

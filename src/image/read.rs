@@ -88,17 +88,18 @@ impl Reader {
         raster::joined([first, second], [left, right].map(Path::display), sizes)
     }
 
-    /// As [`Reader::pair`], from a file with both views: MPO with its two images, or JPS with the right view on the left half unless it says
-    /// otherwise.
+    /// Like [`Reader::pair`], from a file with both views: MPO with its two images, or JPS with the right view on the left half unless it
+    /// says otherwise. Returns, too, whether the file says which view is the left one.
     ///
     /// # Errors
     /// Those of [`Reader::pair`], and where it holds one view alone.
-    pub fn both(self, file: &Path, mask: Option<&Path>) -> Result<Pair> {
+    pub fn both(self, file: &Path, mask: Option<&Path>) -> Result<(Pair, bool)> {
         let bytes = load(file, self.max_pixels)?;
         let views = both::decode_both(file, &bytes, self.max_pixels, self.no_data, self.orient);
-        let [left, right] = views.map_err(|cause| Error::read(file, cause))?;
+        let ([left, right], is_ordered) = views.map_err(|cause| Error::read(file, cause))?;
         let names = ["left", "right"].map(|side| format!("the {side} view in {}", file.display()));
-        raster::joined([self.masked(left, mask, file)?, right], names, Sizes::Equal)
+        let pair = raster::joined([self.masked(left, mask, file)?, right], names, Sizes::Equal)?;
+        Ok((pair, is_ordered))
     }
 
     /// A left image without what the file `mask` masks.

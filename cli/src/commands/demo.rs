@@ -60,7 +60,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let line = words(&folder.path()).into_iter().chain(FLAGS.split(' ').map(Into::into));
     let matching = Matching::parse_from(std::iter::once("match".into()).chain(line));
-    r#match::run(&matching.args)?;
+    r#match::run(matching.args)?;
     folder.publish()?;
     let shown = words(&args.folder).map(|path| path.display().to_string()).join(" ");
     let made = MADE.map(|(name, what)| (args.folder.join(name).display().to_string(), what));

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::image::{Image, pfm, write};
-use mrfgs::rectification::Rectification;
 use mrfgs::calibration::write as calibration_text;
 use mrfgs::check;
+use mrfgs::image::{Image, pfm, write};
+use mrfgs::rectification::Rectification;
 
 use crate::args::{CropArgs, ReadingArgs, RectificationArgs};
-use crate::failure::Result;
+use crate::failure::{Failure, Result};
 use crate::outputs::StagedFolder;
 use crate::pairs::input;
 use crate::{console, stop};
@@ -46,14 +46,13 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Image of the left camera: the first one of the calibration
+    /// Image of the left camera: the first one of the calibration; or a file with both views, MPO or JPS, without RIGHT
     left: PathBuf,
     /// Image of the right camera
-    #[arg(required = true)]
     right: Option<PathBuf>,
     /// Folder for the rectified pair, new or empty
-    #[arg(value_name = "DIR", required = true)]
-    folder: PathBuf,
+    #[arg(value_name = "DIR")]
+    folder: Option<PathBuf>,
 
     /// Calibration of the cameras; where it has several files, such as those of ROS, one after the other
     /// [default: matches of the pair]
@@ -76,9 +75,12 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-pub(crate) fn run(args: &Args) -> Result<()> {
+pub(crate) fn run(mut args: Args) -> Result<()> {
+    input::behind_views(&args.left, &mut args.right, &mut args.folder)?;
+    let missing = || Failure::usage("DIR", "it is missing; give a folder for the rectified pair");
+    let folder = args.folder.take().ok_or_else(missing)?;
     stop::listen();
-    let folder = StagedFolder::new_or_empty(&args.folder)?;
+    let folder = StagedFolder::new_or_empty(&folder)?;
     let reader = args.reading.raw_reader(&args.calib)?;
     let options = args.rectification.options();
     let (left, right, mask) = (args.left.as_path(), args.right.as_deref(), args.mask.as_deref());

@@ -19,15 +19,15 @@ use crate::failure::{self, Failure, Result};
 use crate::matching::Searched;
 use crate::outputs::{Also, Files};
 use crate::pairs::folder::CALIBRATION;
+use crate::pairs::list;
 use crate::remedy;
 
 /// The files of a pair, and how they are read.
 #[derive(clap::Args)]
 pub(crate) struct PairArgs {
-    /// Left image, the reference view
+    /// Left image, the reference view; or a file with both views, MPO or JPS, without RIGHT
     pub(crate) left: PathBuf,
     /// Right image, of the same size and rectified, so that matches are on the same row
-    #[arg(required = true)]
     pub(crate) right: Option<PathBuf>,
 
     #[command(flatten)]
@@ -145,6 +145,11 @@ impl PairArgs {
         }
         let beside = Some(&*self.left).filter(|_| cameras || self.search.takes_calibration());
         Input::new(pair, &self.search, sign, Calib::Files(&self.calib, &self.crop), numbers, rectify, beside)
+    }
+
+    /// Puts what follows the views in its place: see [`behind_views`].
+    pub(crate) fn leave(&mut self, next: &mut Option<PathBuf>) -> Result<()> {
+        behind_views(&self.left, &mut self.right, next)
     }
 
     /// The file with the right view.
@@ -351,8 +356,31 @@ pub(crate) fn views(
 ) -> mrfgs::Result<Pair> {
     match right {
         Some(right) => reader.pair(left, right, mask),
-        None => reader.both(left, mask),
+        None => both(reader, left, mask),
     }
+}
+
+/// The pair in one file. Where that does not say which view is the left one, its matches do, unless a mask of the left view is given.
+fn both(reader: Reader, file: &Path, mask: Option<&Path>) -> mrfgs::Result<Pair> {
+    let (pair, is_ordered) = reader.both(file, mask)?;
+    let is_swapped = || check::warnings(&pair, None).iter().any(|w| matches!(w, Warning::Swapped { .. }));
+    Ok(if !is_ordered && mask.is_none() && is_swapped() { pair.exchanged() } else { pair })
+}
+
+/// Puts what follows the views in its place on a command line. A file `left` that holds both views has no `right` one, so that what follows
+/// stands there.
+pub(crate) fn behind_views(
+    left: &Path,
+    right: &mut Option<PathBuf>,
+    next: &mut Option<PathBuf>,
+) -> Result<()> {
+    if next.is_none() && list::holds_both(left) {
+        *next = right.take();
+    } else if right.is_none() {
+        let reason = format!("it is missing, and {} holds one view; .mpo and .jps hold both", left.display());
+        return Err(Failure::usage("RIGHT", reason));
+    }
+    Ok(())
 }
 
 /// The same of a pair as two cameras took it, whose images may differ in size.
@@ -364,7 +392,7 @@ pub(crate) fn raw_views(
 ) -> mrfgs::Result<Pair> {
     match right {
         Some(right) => reader.raw_pair(left, right, mask),
-        None => reader.both(left, mask),
+        None => both(reader, left, mask),
     }
 }
 

@@ -98,6 +98,12 @@ fn columns(header: &StringRecord) -> std::result::Result<Vec<&'static str>, Stri
     }
 }
 
+/// Whether a file holds both views, by its name.
+pub(crate) fn holds_both(file: &Path) -> bool {
+    let extension = file.extension().unwrap_or_default();
+    ["mpo", "jps"].iter().any(|both| extension.eq_ignore_ascii_case(both))
+}
+
 fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, String> {
     if fields.len() != columns.len() {
         let (found, wanted) = (fields.len(), columns.len());
@@ -109,10 +115,6 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
         let place = columns.iter().position(|column| *column == name)?;
         fields.get(place).filter(|field| !field.is_empty())
     };
-    let holds_both = |path: &str| {
-        let extension = Path::new(path).extension().unwrap_or_default();
-        ["mpo", "jps"].iter().any(|both| extension.eq_ignore_ascii_case(both))
-    };
     let required =
         |name: &str| field(name).map(str::to_owned).ok_or_else(|| format!("the {name} is missing"));
     let within = |column: &str, reason: String| format!("{column}: {reason}");
@@ -123,7 +125,7 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
         name: required("name")?,
         left: required("left")?,
         right: match field("left") {
-            Some(left) if holds_both(left) => field("right").map(str::to_owned),
+            Some(left) if holds_both(Path::new(left)) => field("right").map(str::to_owned),
             _ => Some(required("right")?),
         },
         mask: field("mask").map(str::to_owned),

@@ -13,7 +13,7 @@ const FAILURES: &[Failure] = &[
     // The command line itself.
     ("", 2, "subcommand & match, rectify, depth, sequence, ros, batch & --help"),
     ("frobnicate", 2, "frobnicate & --help"),
-    ("match left.png", 2, "<RIGHT> <OUTPUT> & mrfgs match --help"),
+    ("match left.png", 2, "RIGHT & missing & left.png holds one view"),
     ("completions", 2, "<SHELL> & mrfgs completions --help"),
     ("completions tcsh", 2, "tcsh & bash & zsh"),
     ("man none/man1", 1, "none/man1 & no folder & create that first"),

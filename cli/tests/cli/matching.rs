@@ -538,8 +538,21 @@ fn both_views_may_be_in_one_file() {
         a.data().iter().zip(b.data()).filter(|(a, b)| (*a - *b).abs() < 0.5).count() * 100 / a.data().len()
     };
     assert!(same(&wanted, &found) > 97, "{}", same(&wanted, &found));
-    run(&folder, &format!("match right.png left.png turned.pfm {flags}")).succeeded();
-    assert!(same(&read_pfm(folder.join("turned.pfm")), &found) < 50);
+    run(&folder, &format!("match right.png left.png swapped.pfm {flags}")).succeeded();
+    assert!(same(&read_pfm(folder.join("swapped.pfm")), &found) < 50);
+    // Flags may stand between the file and what follows.
+    run(&folder, "match both.jps --max-disparity 31 --device cpu found.pfm --quiet").succeeded();
+    let at = |name: &str| fs::read(folder.join(name)).unwrap();
+    assert!(at("found.pfm") == at("out/a.pfm"));
+    run(&folder, "inspect both.jps --max-disparity 31 --device cpu --json -").succeeded();
+    // Where the file does not say which half is which, its matches do.
+    fs::write(folder.join("turned.jps"), jpeg_of(&[0, 1])).unwrap();
+    run(&folder, &format!("match turned.jps turned.pfm {flags}")).succeeded();
+    assert!(same(&wanted, &read_pfm(folder.join("turned.pfm"))) > 97);
+    run(&folder, &format!("match both.jps {flags}")).failed(2, "OUTPUT & missing");
+    run(&folder, &format!("match left.png right.png {flags}")).failed(2, "OUTPUT & missing");
+    run(&folder, "rectify both.jps").failed(2, "DIR & missing");
+    run(&folder, "rectify left.png").failed(2, "RIGHT & missing & left.png holds one view");
 }
 
 /// Whole numbers in a map are disparities by their scale, whatever the format.

@@ -4,6 +4,7 @@
 use std::io::Read;
 
 use mcap::records::MessageHeader;
+use mrfgs::image::read::Reader;
 
 use super::*;
 
@@ -571,12 +572,15 @@ fn damaged_images_in_recordings_are_named_once() {
     let compressed = |stamp: u64, image: &image::RgbImage, damaged: bool| {
         let mut file = std::io::Cursor::new(Vec::new());
         image.write_to(&mut file, image::ImageFormat::Jpeg).unwrap();
-        let mut file = file.into_inner();
-        if damaged {
-            // Some bytes less: a part of the pixels is missing.
-            let end = file.len() - 200;
-            file.drain(end..end + 60);
-        }
+        let whole = file.into_inner();
+        let length = whole.len();
+        // Some bytes less: a part of the pixels is missing. It depends on the image without which bytes its decoder goes on.
+        let without = |end: usize| [&whole[..end], &whole[end + 60..]].concat();
+        let is_read = |file: &Vec<u8>| Reader::default().raster_in_memory("a.jpg".as_ref(), file).is_ok();
+        let file = match damaged {
+            true => (length / 2..length - 100).map(without).find(is_read).unwrap(),
+            false => whole,
+        };
         let message = Bytes::with_header(stamp, "camera").text("jpeg");
         message.u32(file.len() as u32).bytes(&file).0
     };

@@ -55,7 +55,9 @@ pub(crate) struct Args {
     execution: ExecutionArgs,
 }
 
-pub(crate) fn run(args: &Args) -> Result<()> {
+pub(crate) fn run(mut args: Args) -> Result<()> {
+    args.pair.leave(&mut args.folder)?;
+    let args = &args;
     let execution = Execution { timings: true, ..args.execution.execution() };
     stop::listen();
     let method = args.method.method()?;

@@ -30,6 +30,8 @@ Examples:
   mrfgs match l.tif r.tif d.tif --max-disparity 255 --roi 4000,2500,800,600
   # Depth without a calibration file:
   mrfgs match l.png r.png d.pfm --focal 700 --baseline 120mm --also depth
+  # Both views in one file of a stereo camera:
+  mrfgs match photo.mpo d.pfm --rectify
   # Two photographs of one camera, without a calibration:
   mrfgs match l.jpg r.jpg d.pfm --rectify
   # Raw images and a calibration:
@@ -64,8 +66,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     numbers: CameraArgs,
     /// Disparity map to write: .pfm, .tif, .tiff or .png, or `-`
-    #[arg(required = true)]
-    output: PathBuf,
+    output: Option<PathBuf>,
 
     /// Sign convention of disparities, in the range, OUTPUT and --also raw; the Ames Stereo Pipeline takes
     /// right-minus-left
@@ -108,7 +109,21 @@ pub(crate) struct Args {
     json: Option<PathBuf>,
 }
 
-pub(crate) fn run(args: &Args) -> Result<()> {
+impl Args {
+    fn output(&self) -> &Path {
+        self.output.as_deref().expect("`run` has refused a command line without it")
+    }
+}
+
+pub(crate) fn run(mut args: Args) -> Result<()> {
+    args.pair.leave(&mut args.output)?;
+    if args.output.is_none() {
+        return Err(Failure::usage(
+            "OUTPUT",
+            "it is missing; give a file for the map, such as disparity.pfm",
+        ));
+    }
+    let args = &args;
     let execution = args.execution.execution();
     stop::listen();
     let method = args.also.made_by(args.method.method()?)?;
@@ -158,7 +173,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     // Outputs take memory too.
     drop(matcher);
-    let files = args.pair.files(&input, Some(&args.output));
+    let files = args.pair.files(&input, Some(args.output()));
     let unit = input.unit();
     let georeferences = pair.georeferences();
     let rectifying = input.rectifying();
@@ -181,7 +196,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 /// Finds out before any computing whether all outputs can be written. Returns the files of `--also`.
 fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathBuf)>> {
-    let output = args.output.as_path();
+    let output = args.output();
     if files::is_printed(output) {
         if let Some(word) = args.also.wanted().next() {
             let reason = "is written beside OUTPUT, and `-` is no file; give OUTPUT a name";
@@ -205,7 +220,7 @@ fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathB
 
 /// Finds out whether the outputs can hold disparities of `range`.
 fn check_range(args: &Args, range: DisparityRange) -> Result<()> {
-    let (output, range) = (args.output.as_path(), args.sign.range(range));
+    let (output, range) = (args.output(), args.sign.range(range));
     if !files::is_printed(output) {
         write::check_disparity_path(output, range.min, range.max)?;
     }
@@ -219,7 +234,7 @@ fn write_outputs(
     outcome: &Outcome,
     record: &MatchRecord,
 ) -> Result<Vec<String>> {
-    let output = args.output.as_path();
+    let output = args.output();
     let map = || outcome.sign.map(outcome.final_map(args.also.limits));
     let mut written = Written::default();
     let mut said = Vec::new();
