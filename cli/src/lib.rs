@@ -218,17 +218,17 @@ mod tests {
     #[test]
     fn commands_have_few_flags() {
         let caps = [
-            ("match", 28),
-            ("rectify", 8),
-            ("depth", 16),
-            ("sequence", 35),
-            ("ros", 26),
-            ("batch", 20),
+            ("match", 29),
+            ("rectify", 9),
+            ("depth", 17),
+            ("sequence", 36),
+            ("ros", 27),
+            ("batch", 21),
             ("evaluate", 12),
             ("evaluate map", 9),
             ("evaluate submission", 10),
             ("bench", 11),
-            ("inspect", 15),
+            ("inspect", 16),
             ("presets", 2),
         ];
         let program = Cli::command();

@@ -80,7 +80,8 @@ impl fmt::Display for Fit {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self { calibrated: (width, height), size: (w, h), origin, scale } = *self;
         write!(f, "is for images of {width} x {height}: those of {w} x {h} count as ")?;
-        match (origin == [0.0; 2], scale == [1.0; 2]) {
+        let is = |all: [f64; 2], one: f64| all.iter().all(|value| (value - one).abs() < f64::EPSILON);
+        match (is(origin, 0.0), is(scale, 1.0)) {
             (true, _) => f.write_str("the same, scaled"),
             (false, true) => f.write_str("the middle of them"),
             (false, false) => {
@@ -94,6 +95,10 @@ impl fmt::Display for Fit {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn is_near(found: [f64; 2], expected: [f64; 2]) -> bool {
+        found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-9)
+    }
 
     #[test]
     fn images_of_one_aspect_are_scaled() {
@@ -117,21 +122,21 @@ mod tests {
     fn pixels_are_scaled_about_the_outer_corner() {
         let half = Fit::scaled((1280, 960), (640, 480)).unwrap();
         // The middle of both, and the centre of the first two pixels in each direction.
-        assert_eq!(half.place([639.5, 479.5]), [319.5, 239.5]);
-        assert_eq!(half.place([0.5, 0.5]), [0.0, 0.0]);
+        assert!(is_near(half.place([639.5, 479.5]), [319.5, 239.5]));
+        assert!(is_near(half.place([0.5, 0.5]), [0.0, 0.0]));
     }
 
     #[test]
     fn the_middle_fills_an_image() {
         let of = |size| Fit::middle((1280, 800), size);
-        assert_eq!(of((1280, 720)).place([640.0, 400.0]), [640.0, 360.0]);
+        assert!(is_near(of((1280, 720)).place([640.0, 400.0]), [640.0, 360.0]));
         assert_eq!(
             of((1280, 720)).to_string(),
             "is for images of 1280 x 800: those of 1280 x 720 count as the middle of them"
         );
-        // 0.6 of it are 768 x 480.
+        // By 0.6, as 480 is to 800.
         let narrow = of((640, 480));
-        assert!(narrow.place([639.5, 399.5]).iter().zip([319.5, 239.5]).all(|(a, b)| (a - b).abs() < 1e-9));
+        assert!(is_near(narrow.place([639.5, 399.5]), [319.5, 239.5]));
         assert!(narrow.to_string().ends_with("count as their middle 1067 x 800, scaled"), "{narrow}");
     }
 }

@@ -25,7 +25,7 @@ const MOST: i64 = Execution::MOST_THREADS as i64;
 #[derive(clap::Args)]
 pub(crate) struct ThreadArgs {
     /// Threads of the CPU path at most, 1 to 1024 [default: as many as processors that the process may use, by affinity and
-    /// cgroups, or fewer by RAYON_NUM_THREADS, OMP_NUM_THREADS or Slurm]
+    /// cgroups, or fewer by `RAYON_NUM_THREADS`, `OMP_NUM_THREADS` or Slurm]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MOST))]
     pub(crate) threads: Option<u16>,
 }

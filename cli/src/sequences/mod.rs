@@ -238,7 +238,7 @@ impl Frames {
     }
 
     /// Takes frames as two cameras took them, to be rectified.
-    pub(crate) fn as_raw(self) -> Self {
+    pub(crate) fn taken_raw(self) -> Self {
         Self { raw: true, ..self }
     }
 

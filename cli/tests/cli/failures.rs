@@ -127,7 +127,7 @@ const FAILURES: &[Failure] = &[
     ("M out.pfm --set memory=0", 2, "--set memory & 0 is outside 1 to 16777216"),
     ("P --max-disparity 900 --memory 1MiB", 2, "--memory & 1 MiB & 60 x 40 & at least & smaller"),
     // Inspection.
-    ("inspect left.png", 2, "<RIGHT> & mrfgs inspect --help"),
+    ("inspect left.png", 2, "RIGHT & missing & left.png holds one view"),
     ("I folder/full", 1, "folder/full & not empty"),
     ("I left.png", 1, "left.png & is a file"),
     ("I none/steps", 1, "none/steps & no folder none & create it"),

@@ -49,7 +49,7 @@ impl Metadata {
                     found.files = list.split(',').map(name_of).filter(|name| !name.is_empty()).collect();
                 }
                 "message_count" => found.count = value.trim().parse().ok(),
-                "compression_format" => found.packed = unquoted(value).to_owned(),
+                "compression_format" => unquoted(value).clone_into(&mut found.packed),
                 _ => {}
             }
         }

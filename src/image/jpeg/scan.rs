@@ -263,16 +263,13 @@ struct Bits<'a> {
 impl Bits<'_> {
     fn fill(&mut self) {
         while self.count <= 56 {
-            let byte = match self.bytes.get(self.at) {
-                Some(byte) => {
-                    // A 0 behind it says that it is no marker.
-                    self.at += if *byte == 0xff { 2 } else { 1 };
-                    *byte
-                }
-                None => {
-                    self.missing += 8;
-                    0
-                }
+            let byte = if let Some(byte) = self.bytes.get(self.at) {
+                // A 0 behind it says that it is no marker.
+                self.at += if *byte == 0xff { 2 } else { 1 };
+                *byte
+            } else {
+                self.missing += 8;
+                0
             };
             self.buffer |= u64::from(byte) << (56 - self.count);
             self.count += 8;

@@ -190,7 +190,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         None => open(args)?,
     };
     if rectify {
-        frames = frames.as_raw();
+        frames = frames.taken_raw();
     }
     let first_image = frames.first_image().map(Path::to_owned);
     check_outputs(args, &frames, first_image.as_deref())?;
