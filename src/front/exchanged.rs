@@ -9,8 +9,8 @@ use crate::rectification::{Options, Rectification};
 
 impl Rectification {
     /// The rectification of the raw images of `pair` by a calibration, as [`Rectification::of_sizes`] makes it. Where that has the right
-    /// camera on the left of the left one, the matches of the pair say whether its images are exchanged as well: nothing is behind the
-    /// cameras. Without matches they stay as they are.
+    /// camera on the left of the left one, the matches of the pair say whether its images are exchanged as well: they are on one row and in
+    /// front of the cameras in one order alone. Without matches the images stay as they are.
     ///
     /// # Errors
     /// Those of [`Rectification::new`]; [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the rectified pair.
@@ -19,13 +19,18 @@ impl Rectification {
         if !by.has_exchanged_cameras() {
             return Ok(by);
         }
+        let other = by.clone().with_images_exchanged();
         let rectified = by.apply(pair)?;
         if matches::check_memory(&rectified).is_err() {
             return Ok(by);
         }
         let infinite = -by.calibration()?.doffs.unwrap_or(0.0) * f64::from(FRACTION);
-        let found = matches::find(&rectified, None, None);
-        let behind = found.iter().filter(|m| f64::from(m.disparity) < infinite).count();
-        Ok(if 2 * behind > found.len() { by.with_images_exchanged() } else { by })
+        let in_front = |rectified: &Pair| {
+            let found = matches::find(rectified, None, None);
+            found.iter().filter(|m| f64::from(m.disparity) >= infinite).count()
+        };
+        let as_given = in_front(&rectified);
+        drop(rectified);
+        Ok(if in_front(&other.apply(pair)?) > as_given { other } else { by })
     }
 }
