@@ -17,7 +17,7 @@ const WRONG: &[(&str, &str, &str, &str)] = &[
         "EuRoC",
         "[240, 180]",
         "[240, 181]",
-        "T_BS: is of a camera with images of 240 x 181 & 240 x 180 & EuRoC's",
+        "the calibration is for images of 240 x 180, 240 x 181 and these are 240 x 180 & --calib-crop",
     ),
     ("ORB-SLAM3", "\"PinHole\"", "\"Cylinder\"", "Camera.type: expected PinHole & `Cylinder` & ORB-SLAM's"),
     ("ORB-SLAM3", "Stereo.T_c1_c2", "Stereo.T", "Stereo.T_c1_c2 is missing & ORB-SLAM's"),
