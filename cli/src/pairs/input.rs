@@ -71,8 +71,12 @@ impl Calib<'_> {
             Self::Files(files, crop) => {
                 let known = calibration::read(files)?;
                 let Some(part) = &crop.calib_crop else { return Ok(known) };
-                let error = |e| failure::in_file(e, shown(files).as_ref(), "");
-                known.of_part(part).map_err(|e| Failure::usage("--calib-crop", error(e)))
+                known.of_part(part).map_err(|e| match e {
+                    Error::Calibration(reason) => {
+                        Failure::usage("--calib-crop", format!("{} {reason}", shown(files)))
+                    }
+                    e => e.into(),
+                })
             }
             Self::Texts(texts) => {
                 let texts: Vec<_> = texts.iter().map(|(name, text)| (name.as_path(), text.clone())).collect();
