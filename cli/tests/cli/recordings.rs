@@ -577,10 +577,8 @@ fn damaged_images_in_recordings_are_named_once() {
         // Some bytes less: a part of the pixels is missing. It depends on the image without which bytes its decoder goes on.
         let without = |end: usize| [&whole[..end], &whole[end + 60..]].concat();
         let is_read = |file: &Vec<u8>| Reader::default().raster_in_memory("a.jpg".as_ref(), file).is_ok();
-        let file = match damaged {
-            true => (length / 2..length - 100).map(without).find(is_read).unwrap(),
-            false => whole,
-        };
+        let file =
+            if damaged { (length / 2..length - 100).map(without).find(is_read).unwrap() } else { whole };
         let message = Bytes::with_header(stamp, "camera").text("jpeg");
         message.u32(file.len() as u32).bytes(&file).0
     };
