@@ -422,6 +422,9 @@ fn blurred(image: &Image, radius: i32) -> Image {
     }))
 }
 
+/// Says which pixels are in a part of an image.
+type Pixels<'a> = &'a dyn Fn(usize, usize) -> bool;
+
 /// Of a view whose part is none, the rest has a good map. Faint texture alone, as on walls, is no doubt.
 #[test]
 fn parts_that_do_not_belong_are_told() {
@@ -469,7 +472,7 @@ fn parts_that_do_not_belong_are_told() {
         let columns = |first: usize, last: usize| Part::Columns { first, last, of: width };
 
         // A copy of the other view.
-        let copies: [(Part, &dyn Fn(usize, usize) -> bool); 4] = [
+        let copies: [(Part, Pixels); 4] = [
             (rows(0, height / 2 - 1), &|_, y| !half(y)),
             (rows(height / 2, height - 1), &|_, y| half(y)),
             (columns(0, width / 2 - 1), &|x, _| x < width / 2),

@@ -66,7 +66,6 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("use mrfgs::{Matcher, Method, Pair};", "Rust"),
     ("use mrfgs::image::raster::Raster;", "Rust"),
     ("import mrfgs", "Python; scripts/python tries the package"),
-    ("import cv2", "Python with OpenCV"),
     ("from mcap_ros2.reader import read_ros2_messages", "Python; scripts/recordings reads such files"),
     (
         "left, right = (cv2.imread(f\"testdata/raw/{view}.png\")[..., ::-1] for view in (\"left\", \"right\"))",

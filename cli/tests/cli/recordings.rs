@@ -445,7 +445,7 @@ fn recordings_that_are_wrong_are_told_in_one_line() {
         &good.iter().filter(|one| one.0.starts_with("/left")).cloned().collect::<Vec<_>>(),
     );
     record(&at("raw.mcap"), &images("image_raw", 0));
-    record(&at("size.mcap"), &[cameras((128, 96)), images("image_raw", 0)].concat());
+    record(&at("size.mcap"), &[cameras((128, 100)), images("image_raw", 0)].concat());
     record(&at("both.mcap"), &[images("image_raw", 0), images("image_rect", 0)].concat());
     record(&at("text.mcap"), &[("/left".into(), "std_msgs/msg/String", vec![0, 1, 0, 0])]);
     for (name, bytes) in [
@@ -476,7 +476,7 @@ fn recordings_that_are_wrong_are_told_in_one_line() {
         ("cut-message.mcap OUT", 1, 2, "/left/image_rect & ends early"),
         ("half.mcap OUT", 1, 0, "/left/image_rect alone"),
         ("raw.mcap OUT", 1, 0, "/left/image_raw is not rectified & /left/camera_info & --rectify"),
-        ("size.mcap OUT", 1, 0, "size.mcap:/left/camera_info & 128 x 96 & 64 x 48"),
+        ("size.mcap OUT", 1, 0, "size.mcap:/left/camera_info & 128 x 100 & 64 x 48"),
         ("both.mcap OUT", 1, 0, "several pairs & --topics & /left/image_raw,/right/image_raw"),
         ("text.mcap OUT", 1, 0, "no images & /left (std_msgs/msg/String)"),
         ("good.mcap OUT --topics /a,/b", 1, 0, "has no topic /a & /left/image_rect, /right/image_rect"),
