@@ -198,10 +198,10 @@ pub(crate) unsafe fn pair(images: [*const Image; 2], masks: [*const Image; 2]) -
     Ok(Pair::of_frames(left, right)?)
 }
 
-/// The same of images as two cameras took them, which may differ in size.
+/// The pair of two raw images, which may differ in size.
 ///
 /// # Safety
-/// As of [`pair`].
+/// The pointers of both frames must be null or good, as for [`pair`].
 pub(crate) unsafe fn raw_pair(images: [*const Image; 2]) -> Result<Pair, Failure> {
     // SAFETY: the caller promises it.
     let [left, right] = unsafe { rasters(images, [std::ptr::null(); 2]) }?;
@@ -209,7 +209,7 @@ pub(crate) unsafe fn raw_pair(images: [*const Image; 2]) -> Result<Pair, Failure
 }
 
 /// # Safety
-/// As of [`pair`].
+/// The pointers of both frames must be null or good, as for [`pair`].
 unsafe fn rasters<'a>(
     images: [*const Image; 2],
     masks: [*const Image; 2],

@@ -83,7 +83,7 @@ impl Decoder {
         Ok(Self { process, frames, ended: false, complaint: Complaint::default() })
     }
 
-    /// What it complains of by the end of the film.
+    /// The complaints of ffmpeg up to the end of the film.
     pub(crate) fn complaint(&self) -> Complaint {
         self.complaint.clone()
     }
@@ -172,7 +172,7 @@ impl Process {
     /// Waits for its end. Returns what it says last.
     ///
     /// # Errors
-    /// The same, where it has failed.
+    /// The reason why ffmpeg failed.
     fn end(&mut self) -> io::Result<String> {
         let status = self.child.wait()?;
         let said = self.says.take().and_then(|says| says.join().ok()).unwrap_or_default();

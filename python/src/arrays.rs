@@ -30,7 +30,7 @@ fn array<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUn
     let array = numpy.call_method1(if by_dlpack { "from_dlpack" } else { "asanyarray" }, (given,));
     let array = array.map_err(|error| exceptions::instead(py, error, wrong()))?;
     let mut array = array.cast_into::<PyUntypedArray>().map_err(|_| wrong())?;
-    // What has half the bits is held exactly.
+    // Single precision holds every half-precision value exactly.
     if (array.dtype().kind(), array.dtype().itemsize()) == (b'f', 2) {
         array = array.call_method1("astype", ("float32",))?.cast_into()?;
     }
@@ -224,7 +224,7 @@ pub(crate) fn pair(
     Pair::of_frames(left, right).map_err(exception)
 }
 
-/// The same of images as two cameras took them, which may differ in size.
+/// The pair of two raw images, which may differ in size.
 pub(crate) fn raw_pair(
     left: &Image,
     right: &Image,

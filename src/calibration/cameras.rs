@@ -18,7 +18,7 @@ pub struct StereoCalibration {
     pub views: Option<Views>,
     /// Width and height of the images, in pixels.
     pub size: Option<(usize, usize)>,
-    /// Those of the right images, where they are others.
+    /// Width and height of the right images, where they differ from those of the left ones.
     pub right_size: Option<(usize, usize)>,
     /// Whether images of another size are the middle of these, scaled until it fills them.
     pub(super) fills: bool,
@@ -132,7 +132,7 @@ impl Views {
         !self.is_vertical() && self.translation[0] > 0.0
     }
 
-    /// The same with each camera in the place of the other one.
+    /// The calibration with left and right camera exchanged.
     pub(crate) fn exchanged(&self) -> Self {
         let Self { rotations: [r1, r2], cameras: [left, right], translation, size } = *self;
         Self { rotations: [r2, r1], cameras: [right, left], translation: translation.map(|v| -v), size }
@@ -191,7 +191,7 @@ impl StereoCalibration {
         self.size.map(|left| [left, self.right_size.unwrap_or(left)])
     }
 
-    /// That of a part of the images, as it is: of what a camera reads of its sensor, or a program has cut out. Both cameras have the same
+    /// The calibration of a part of the images, unscaled, such as a camera reads of its sensor or a program cuts out. Both cameras have the same
     /// part.
     ///
     /// # Errors
@@ -248,7 +248,7 @@ impl StereoCalibration {
         Some([fit(left, sizes[0])?, fit(right, sizes[1])?])
     }
 
-    /// That of images that come out of its own like this.
+    /// The calibration of images that come out of the calibrated ones by `fits`, left and right.
     fn in_sizes(&self, fits: [Option<Fit>; 2]) -> Self {
         let lens = |lenses: [Lens; 2], i: usize| fits[i].map_or(lenses[i], |fit| lenses[i].in_size(&fit));
         let views = self.views.map(|views| match fits[0] {

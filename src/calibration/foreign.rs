@@ -171,7 +171,7 @@ pub(super) fn of_bytes(bytes: &[u8]) -> Option<String> {
     KINDS_WITH_REMEDY.iter().find(begins).map(|(.., what)| (*what).to_owned())
 }
 
-/// The same of a text.
+/// The name and the remedy of a text that is known to be no calibration; `None` where it may be one.
 pub(super) fn of_text(text: &str) -> Option<String> {
     if let Some(found) = of_bytes(text.as_bytes()) {
         return Some(found);

@@ -12,7 +12,7 @@ use crate::image::calib::{Camera, Unit};
 /// Cameras 0 and 1 are grey, 2 and 3 in colour.
 const GREY: [usize; 2] = [0, 1];
 const COLOUR: [usize; 2] = [2, 3];
-/// Those of `DrivingStereo`, left and right.
+/// The names of the left and right camera of `DrivingStereo`.
 const DRIVING_STEREO: [usize; 2] = [101, 103];
 
 /// Whether these entries are KITTI's: whether a projection has a name that OpenCV's have not.

@@ -83,7 +83,7 @@ fn of_size(entries: &Entries, name: &str, size: (usize, usize)) -> Result<Stereo
     })
 }
 
-/// That of a section. Fisheyes have k1 to k4; what else they have is 0.
+/// The distortion in a section. For fisheyes k1 to k4 are given, and all other coefficients are 0.
 fn distortion(section: &Entries) -> Result<Distortion> {
     let c = |name: &str| section.number_or_zero(name);
     let [k1, k2, k3, k4] = [c("k1")?, c("k2")?, c("k3")?, c("k4")?];

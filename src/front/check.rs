@@ -89,17 +89,17 @@ pub fn range(pair: &Pair) -> Result<DisparityRange> {
     range_from(pair, None)
 }
 
-/// The same where the cameras are known: what is in front of them has disparities above -`doffs`, the distance of their principal points
+/// The range of a pair whose cameras are known: points in front of them have disparities above -`doffs`, the distance of their principal points
 /// along the row, in pixels. The range begins there at the least, and matches behind the cameras do not count, unless most are there: then
 /// the pair is not of these cameras.
 ///
 /// # Errors
-/// Those of [`range`].
+/// The errors of [`range`].
 pub fn range_of_cameras(pair: &Pair, doffs: f64) -> Result<DisparityRange> {
     range_from(pair, Some(-doffs))
 }
 
-/// That of disparities from `least` on.
+/// The range of the matches, and where `least` is given, of those with disparities from there on.
 fn range_from(pair: &Pair, least: Option<f64>) -> Result<DisparityRange> {
     matches::check_memory(pair)?;
     if let Some(range) = range_by_matches(pair, least) {
@@ -631,7 +631,7 @@ mod tests {
         let expected: Vec<_> = found.iter().map(|m| m.disparity).collect();
         found.extend([at(30, -634), at(350, 285), at(90, 120)]);
         assert_eq!(without_outliers(&found, (400, 100)), expected);
-        // What is alone, but not far away, stays.
+        // A lone match that is not far from the others stays.
         found.truncate(403);
         found.push(at(30, 70));
         assert_eq!(without_outliers(&found, (400, 100)).len(), 404);

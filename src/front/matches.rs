@@ -101,12 +101,12 @@ pub(super) struct Corner {
     pub(super) offset: Option<u32>,
 }
 
-/// What a search gives.
+/// The result of a search.
 #[derive(Default)]
 pub(super) struct Survey {
-    /// What was searched, in raster order.
+    /// The corners that were searched, in raster order.
     pub(super) corners: Vec<Corner>,
-    /// What was found.
+    /// The matches that were found.
     pub(super) matches: Vec<Match>,
 }
 
@@ -122,7 +122,7 @@ pub(super) fn search(
     survey(pair, zones, range, spacing, rows).matches
 }
 
-/// The same, with what was searched.
+/// Like [`search`], and also returns the corners that were searched.
 pub(super) fn survey(
     pair: &Pair,
     zones: Option<(&Plane<u32>, usize)>,

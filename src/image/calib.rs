@@ -144,7 +144,7 @@ impl Calibration {
         }
     }
 
-    /// That of a part of the images, as it is.
+    /// The calibration of a part of the images, unscaled.
     pub(crate) fn of_part(&self, part: &Rect) -> Self {
         let side = |side: usize| u32::try_from(side).ok();
         Self {

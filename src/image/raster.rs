@@ -344,7 +344,7 @@ impl Pair {
         joined([left, right], ["the left image", "the right one"], Sizes::Equal)
     }
 
-    /// The same of images as two cameras took them, which may differ in size: the pair has the larger one, and the smaller image is masked
+    /// A pair of two raw images, which may differ in size: the pair has the larger one, and the smaller image is masked
     /// outside of itself. A [`Rectification`](crate::rectification::Rectification) makes views of one size of them.
     ///
     /// # Errors

@@ -74,7 +74,7 @@ impl Reader {
         self.pair_of(left, right, mask, Sizes::Equal)
     }
 
-    /// The same of images as two cameras took them, which may differ in size: see [`Pair::of_raw_frames`].
+    /// Reads a pair of raw images, which may differ in size: see [`Pair::of_raw_frames`].
     ///
     /// # Errors
     /// Those of [`Reader::pair`], but for the sizes.

@@ -19,7 +19,7 @@ const PAIR: [(&str, &[u8]); 2] = [
 /// Its range and cameras, and what else is made of it.
 const FLAGS: &str = "--max-disparity 47 --focal 240 --baseline 0.186m --also preview,points";
 
-/// What is made of it.
+/// The files that the demo makes of its pair, and what each is.
 const MADE: [(&str, &str); 3] = [
     ("disparity.preview.png", "the map in colours"),
     ("disparity.points.ply", "the points; MeshLab, CloudCompare and Blender show them"),

@@ -387,7 +387,7 @@ pub(crate) fn behind_views(
     Ok(())
 }
 
-/// The same of a pair as two cameras took it, whose images may differ in size.
+/// The raw pair in two files, which may differ in size, or in one file that holds both views.
 pub(crate) fn raw_views(
     reader: Reader,
     left: &Path,

@@ -89,7 +89,7 @@ pub(super) struct Stream {
     read: Arc<AtomicU64>,
     whole: u64,
     ended: bool,
-    /// What ffmpeg complains of, where it decodes it.
+    /// The complaints of ffmpeg, where it decodes the film.
     decoded: Option<Complaint>,
 }
 

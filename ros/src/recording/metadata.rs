@@ -20,7 +20,7 @@ pub(super) struct Metadata {
 }
 
 impl Metadata {
-    /// That of the file `path`.
+    /// Reads the `metadata.yaml` called `path`.
     pub(super) fn read(path: &Path) -> Self {
         let mut bytes = Vec::new();
         // Without it the files speak for themselves.

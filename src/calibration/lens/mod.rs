@@ -161,7 +161,7 @@ impl Lens {
         Ok(Self { focal_length, principal_point, distortion, reach: distortion.reach() })
     }
 
-    /// The same lens before images of another size.
+    /// The lens in pixels of images of another size.
     pub(crate) fn in_size(&self, fit: &Fit) -> Self {
         let Camera { focal_length, principal_point } =
             Camera { focal_length: self.focal_length, principal_point: self.principal_point }.in_size(fit);
