@@ -194,6 +194,9 @@ pub fn of_texts(files: &[(&Path, String)]) -> Result<StereoCalibration> {
         roots.extend(self::roots(path, text)?.into_iter().map(|root| (*path, root)));
     }
     let each: Vec<Entries> = roots.iter().map(|(path, root)| Entries::new(vec![(path, root)])).collect();
+    if each.is_empty() {
+        return Err(Error::Calibration("has no file".into()));
+    }
     if let Some((_, found)) = in_some_form(&each) {
         return found;
     }
@@ -201,8 +204,7 @@ pub fn of_texts(files: &[(&Path, String)]) -> Result<StereoCalibration> {
     let whole = |one: &Entries| in_some_form(std::slice::from_ref(one)).filter(|(_, found)| found.is_ok());
     let found = each.iter().enumerate().find_map(|(i, one)| whole(one).map(|(name, _)| (i, name)));
     match (&each[..], found) {
-        ([], _) => Err(Error::Calibration("has no file".into())),
-        ([one], _) => wrong(one, KNOWN),
+        ([] | [_], _) => wrong(&each[0], KNOWN),
         (all, Some((i, name))) => Err(not_needed(all[usize::from(i == 0)].path(), all[i].path(), name)),
         ([.., last], None) => wrong(
             last,
