@@ -52,7 +52,7 @@ pub(crate) struct Decoder {
     complaint: Complaint,
 }
 
-/// What ffmpeg complains of in a film that it decodes to its end nevertheless.
+/// The complaints of ffmpeg about a film that it decodes to its end.
 #[derive(Clone, Default)]
 pub(crate) struct Complaint(Arc<OnceLock<String>>);
 

@@ -163,7 +163,7 @@ mod tests {
         Cli::command().debug_assert();
     }
 
-    /// What is wrong with the flags of an example.
+    /// The reason why the parser refuses an example, if it does.
     fn fault(line: &str) -> Option<String> {
         let line = ["  #", " | ", " > ", " && "]
             .iter()

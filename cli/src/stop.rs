@@ -23,7 +23,7 @@ const BY_PEOPLE: [c_int; 3] = {
 #[cfg(not(unix))]
 const BY_PEOPLE: [c_int; 2] = [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM];
 
-/// The others that end a program, but for those that tell of a defect: a terminal that is gone, a limit of time, a scheduler. They
+/// Signals of the system that end a program, except those that tell of a defect: a terminal that is gone, a limit of time, a scheduler. They
 /// come more than once: from the system and from the shell, or every second.
 #[cfg(unix)]
 const BY_SYSTEMS: [c_int; 7] = {

@@ -145,7 +145,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// What is wrong where most of the map is behind the cameras.
+/// The warning about a map of which most is behind the cameras.
 ///
 /// # Errors
 /// Where all of it is, or it holds no disparity.

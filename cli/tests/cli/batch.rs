@@ -318,7 +318,7 @@ fn an_interrupted_batch_tidies_up() {
         assert_eq!(said, format!("mrfgs: stopped after {complete} of 12; run it again to resume\n"));
         assert_eq!(listing(&out).len(), 2 * complete, "nothing half written is left");
     }
-    // As `nohup` starts it.
+    // SIGHUP is ignored, like under `nohup`.
     let mut child = Command::new("sh");
     child.args(["-c", "trap '' HUP && exec \"$0\" batch list.csv out --device cpu --threads 1"]);
     child.arg(env!("CARGO_BIN_EXE_mrfgs")).current_dir(&*folder).stderr(Stdio::null());
@@ -329,7 +329,7 @@ fn an_interrupted_batch_tidies_up() {
     assert_eq!(listing(&out).len(), 24);
 }
 
-/// What is wrong with the files of one pair in the output folder is wrong with that pair alone.
+/// A fault of one pair's files in the output folder fails that pair alone.
 #[test]
 fn a_record_that_cannot_be_written_fails_its_pair_alone() {
     let folder = pairs(4, (64, 48));

@@ -360,7 +360,7 @@ fn images_of_another_size_are_told() {
     let outside = "--calib-crop & odd.yml & 240 x 200 & not inside";
     run(&folder, &format!("{images} out --calib odd.yml --calib-crop 0,21,240,180")).failed(2, outside);
     run(&folder, &format!("{images} out --calib-crop 0,0,240,180")).failed(2, "--calib");
-    // Those of one camera are twice as large.
+    // One camera's images are twice as large.
     let right = image::open(scene("raw/right.png")).unwrap();
     right.resize(480, 360, image::imageops::FilterType::Nearest).save(folder.join("right.png")).unwrap();
     run(&folder, "rectify @raw/left.png right.png two --calib fits.yml")

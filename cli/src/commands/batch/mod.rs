@@ -406,7 +406,7 @@ mod tests {
         folder
     }
 
-    /// What the record of the first pair in `list` would hold of the request; names of files are those in `folder`.
+    /// The request in the record of the first pair in `list`; names of files are those in `folder`.
     fn asked(folder: &Path, list: &str, flags: &str) -> Value {
         let words = ["batch", list, "out"].into_iter().chain(flags.split_whitespace());
         let words = words.map(|word| {
