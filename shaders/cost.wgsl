@@ -19,10 +19,10 @@ struct Params {
 @group(0) @binding(4) var<storage, read> left_census: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read> right_census: array<vec2<u32>>;
 // Weight of colour at each pixel.
-@group(0) @binding(6) var<storage, read> weight: array<u32>;
+@group(0) @binding(6) var<storage, read> contrast: array<u32>;
 @group(0) @binding(7) var<storage, read_write> left_census_out: array<vec2<u32>>;
 @group(0) @binding(8) var<storage, read_write> right_census_out: array<vec2<u32>>;
-@group(0) @binding(9) var<storage, read_write> weight_out: array<u32>;
+@group(0) @binding(9) var<storage, read_write> contrast_out: array<u32>;
 
 // Matching cost of level 0 by the mean colour difference over a window. One invocation per RUN pixels of a
 // row and quad of labels: it computes each column of the window once for all of them.
@@ -139,7 +139,7 @@ fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     let out = id.y * pitch + id.x;
     left_census_out[out] = left_bits;
     right_census_out[out] = right_bits;
-    weight_out[out] = w;
+    contrast_out[out] = w;
 }
 
 // Matching cost of level 0 by census and colour difference. One invocation per pixel and quad of labels.
@@ -156,7 +156,7 @@ fn ad_census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     let pixel = left[row + x];
     let levels = channels(pixel) >> vec3(8u);
     let bits = left_census[row + x];
-    let w = weight[row + x];
+    let w = contrast[row + x];
     var costs = vec4<u32>();
     for (var i = 0u; i < 4u; i++) {
         let xr = i32(x) - params.level.low - i32(4u * quad + i);

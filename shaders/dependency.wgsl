@@ -15,7 +15,7 @@ struct Params {
 // Codes of the neighbours, four per word.
 @group(0) @binding(1) var<storage, read> members: array<u32>;
 @group(0) @binding(2) var<storage, read> belief: array<Quad>;
-@group(0) @binding(3) var<storage, read_write> messages: array<Quad>;
+@group(0) @binding(3) var<storage, read_write> dependency: array<Quad>;
 @group(0) @binding(4) var<storage, read> windows: array<u32>;
 
 const ABSENT: u32 = 0xffffffffu;
@@ -24,7 +24,7 @@ const ABSENT: u32 = 0xffffffffu;
 // truncation is absolute; infinite at labels that the member does not have.
 fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
     let b = unpack(belief[member]);
-    var q = b - unpack(messages[message]);
+    var q = b - unpack(dependency[message]);
     if ABSOLUTE {
         q = max(q, vec4(least)) - vec4(least);
     }
@@ -104,7 +104,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
                 let sum = select(total - q[slot], vec4(MOST), q[slot] == vec4(MOST));
                 least[slot] = min(least[slot], sum);
                 if STEPS {
-                    messages[own + (slot * quads + quad) * width] = pack(min(sum, vec4(MOST)));
+                    dependency[own + (slot * quads + quad) * width] = pack(min(sum, vec4(MOST)));
                 }
             }
         }
@@ -123,17 +123,17 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
                 var below = MOST;
-                var sums = unpack(messages[own + (slot * quads + spanned.x) * width]);
+                var sums = unpack(dependency[own + (slot * quads + spanned.x) * width]);
                 for (var quad = spanned.x; quad < spanned.y; quad++) {
                     let to = own + (slot * quads + quad) * width;
                     var next = vec4(MOST);
                     if quad + 1u < spanned.y {
-                        next = unpack(messages[to + width]);
+                        next = unpack(dependency[to + width]);
                     }
                     let near = min(vec4(below, sums.xyz), vec4(sums.yzw, next.x)) + vec4(params.step);
                     let has = unpack(belief[bases[0] + quad * width]) != vec4(MOST);
                     let sum = min(min(sums, select(vec4(MOST), near, has)), vec4(high[slot]));
-                    messages[to] = pack(sum - vec4(low[slot]));
+                    dependency[to] = pack(sum - vec4(low[slot]));
                     below = sums.w;
                     sums = next;
                 }
@@ -153,7 +153,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
                 let sum = min(total - q[slot], vec4(high[slot]));
-                messages[own + (slot * quads + quad) * width] = pack(sum - vec4(low[slot]));
+                dependency[own + (slot * quads + quad) * width] = pack(sum - vec4(low[slot]));
             }
         }
     }

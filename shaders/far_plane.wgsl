@@ -24,7 +24,7 @@ struct Params {
 // too; what reaches them from the right, and then from below, and at last their planes.
 @group(0) @binding(4) var<storage, read_write> patches: array<i32>;
 // Shares of weight that are left after a step, in 1/256, by the difference between two patches.
-@group(0) @binding(5) var<storage, read> shares: array<u32>;
+@group(0) @binding(5) var<storage, read> patch_shares: array<u32>;
 
 // The first number of each of these.
 const OWN: u32 = 0u;
@@ -188,7 +188,7 @@ fn share_between(a: vec2<u32>, b: vec2<u32>) -> u32 {
     if one.weight > 0u && other.weight > 0u {
         apart += u32(max(abs(one.disparity - other.disparity) - STEP, 0)) >> STEP_BITS;
     }
-    return shares[min(apart, LAST_SHARE)];
+    return patch_shares[min(apart, LAST_SHARE)];
 }
 
 // Moments as seen from a patch that is `step` patches away, where `share` / 256 of their weight is left.

@@ -19,11 +19,11 @@ struct Params {
 @group(0) @binding(2) var<storage, read> flags: array<u32>;
 @group(0) @binding(3) var<storage, read> source_disparity: array<i32>;
 @group(0) @binding(4) var<storage, read> source_flags: array<u32>;
-@group(0) @binding(5) var<storage, read_write> filled_disparity: array<i32>;
-@group(0) @binding(6) var<storage, read_write> filled_flags: array<u32>;
+@group(0) @binding(5) var<storage, read_write> next_disparity: array<i32>;
+@group(0) @binding(6) var<storage, read_write> next_flags: array<u32>;
 // For every row: 1 if it holds a valid pixel, else 0; and the row that it takes its values from.
-@group(0) @binding(7) var<storage, read_write> is_known: array<u32>;
-@group(0) @binding(8) var<storage, read_write> source_of: array<u32>;
+@group(0) @binding(7) var<storage, read_write> known_rows: array<u32>;
+@group(0) @binding(8) var<storage, read_write> source_rows: array<u32>;
 
 // Whether each row holds a valid pixel. One invocation per row.
 @compute @workgroup_size(GROUP)
@@ -36,7 +36,7 @@ fn rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     while x < params.level.width && !is_valid(flags[id.x * params.level.pixel_pitch + x]) {
         x++;
     }
-    is_known[params.band.first_row + id.x] = u32(x < params.level.width);
+    known_rows[params.band.first_row + id.x] = u32(x < params.level.width);
 }
 
 // The row that each row takes its values from: the nearest that holds a valid pixel, the upper one of two;
@@ -51,16 +51,16 @@ fn sources(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     }
     var source = y;
     for (var step = 0u; step < height; step++) {
-        if step <= y && is_known[y - step] == 1u {
+        if step <= y && known_rows[y - step] == 1u {
             source = y - step;
             break;
         }
-        if y + step < height && is_known[y + step] == 1u {
+        if y + step < height && known_rows[y + step] == 1u {
             source = y + step;
             break;
         }
     }
-    source_of[y] = source;
+    source_rows[y] = source;
 }
 
 // Fills invalid pixels with the farther of the two nearest valid disparities. One invocation per pixel.
@@ -71,7 +71,7 @@ fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
-    let source = source_of[params.band.first_row + id.y];
+    let source = source_rows[params.band.first_row + id.y];
     if source < params.source_first_row || source >= params.source_first_row + params.source_rows {
         return;
     }
@@ -102,6 +102,6 @@ fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             validity |= FILLED;
         }
     }
-    filled_disparity[at] = value;
-    filled_flags[at] = validity;
+    next_disparity[at] = value;
+    next_flags[at] = validity;
 }

@@ -17,12 +17,13 @@ struct Params {
 }
 
 @group(0) @binding(1) var<storage, read> guide: array<vec4<u32>>;
-@group(0) @binding(2) var<storage, read_write> coarse_guide: array<vec4<u32>>;
+@group(0) @binding(2) var<storage, read_write> next_guide: array<vec4<u32>>;
 // Codes of the neighbours, four per word.
 @group(0) @binding(3) var<storage, read_write> members_out: array<u32>;
 @group(0) @binding(4) var<storage, read> members_in: array<u32>;
 // A bit for each factor that holds the pixel, by its place around it.
 @group(0) @binding(5) var<storage, read_write> incoming: array<vec2<u32>>;
+@group(0) @binding(6) var<storage, read> fine_guide: array<vec4<u32>>;
 
 // Words of a factor's codes.
 const MEMBER_WORDS: u32 = (NEIGHBOURS + 3u) / 4u;
@@ -44,7 +45,7 @@ fn downsample(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     for (var j = -2; j <= 2; j++) {
         let row = u32(clamp(at.y + j, 0, size.y - 1) - top) * params.fine.pixel_pitch;
         for (var i = -2; i <= 2; i++) {
-            let pixel = guide[params.fine_at + row + u32(clamp(at.x + i, 0, size.x - 1))];
+            let pixel = fine_guide[params.fine_at + row + u32(clamp(at.x + i, 0, size.x - 1))];
             if pixel.z == 0u {
                 // 1, 4, 6, 4, 1 in both directions.
                 let w = ((6u >> u32(abs(i))) + u32(i == 1 || i == -1))
@@ -61,7 +62,7 @@ fn downsample(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
         let mean = (2u * sums + vec3(total)) / vec3(2u * total);
         out = vec4(mean.x | (mean.y << 16u), mean.z, 0u, 0u);
     }
-    coarse_guide[id.y * params.level.pixel_pitch + id.x] = out;
+    next_guide[id.y * params.level.pixel_pitch + id.x] = out;
 }
 
 // Keeps the neighbours with the smallest keys, distance << RANK_BITS | rank, in their order.

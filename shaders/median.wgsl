@@ -6,6 +6,6 @@
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
     if id.x < params.level.width && id.y < params.band.rows {
-        smoothed[id.y * params.level.pixel_pitch + id.x] = median(window(id), 0u);
+        next_disparity[id.y * params.level.pixel_pitch + id.x] = median(window(id), 0u);
     }
 }

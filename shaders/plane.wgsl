@@ -64,6 +64,6 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             let range = FRACTION * vec2(low, low + i32(params.level.labels) - 1);
             value = clamp(value + plane.value, range.x, range.y);
         }
-        smoothed[id.y * params.level.pixel_pitch + id.x] = value;
+        next_disparity[id.y * params.level.pixel_pitch + id.x] = value;
     }
 }

@@ -12,17 +12,17 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 // Colours in 8 bits each, | 1 << 24 if masked; grey.
-@group(0) @binding(1) var<storage, read> left: array<vec2<u32>>;
-@group(0) @binding(2) var<storage, read> right: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read_write> left_census_out: array<u32>;
-@group(0) @binding(4) var<storage, read_write> right_census_out: array<u32>;
-@group(0) @binding(5) var<storage, read> left_census: array<u32>;
-@group(0) @binding(6) var<storage, read> right_census: array<u32>;
+@group(0) @binding(1) var<storage, read> full_left: array<vec2<u32>>;
+@group(0) @binding(2) var<storage, read> full_right: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read_write> full_left_census_out: array<u32>;
+@group(0) @binding(4) var<storage, read_write> full_right_census_out: array<u32>;
+@group(0) @binding(5) var<storage, read> full_left_census: array<u32>;
+@group(0) @binding(6) var<storage, read> full_right_census: array<u32>;
 // label | best << 16, runner-up.
 @group(0) @binding(7) var<storage, read> optima: array<vec2<u32>>;
 // Four costs a word: the first words of all pixels of a row, then the second ones, and so on.
-@group(0) @binding(8) var<storage, read_write> costs_out: array<u32>;
-@group(0) @binding(9) var<storage, read> costs_in: array<u32>;
+@group(0) @binding(8) var<storage, read_write> block_costs_out: array<u32>;
+@group(0) @binding(9) var<storage, read> block_costs: array<u32>;
 @group(0) @binding(10) var<storage, read_write> raw: array<i32>;
 @group(0) @binding(11) var<storage, read_write> disparity: array<i32>;
 
@@ -40,8 +40,8 @@ fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     let top = max(2u * params.band.first_row, 2u) - 2u;
     let last = vec2(i32(width), i32(2u * params.level.height)) - 1;
     let centre = (u32(y) - top) * params.full_pitch + u32(x);
-    let l = left[centre];
-    let r = right[centre];
+    let l = full_left[centre];
+    let r = full_right[centre];
     var left_bits = 0u;
     var right_bits = 0u;
     for (var dy = -2; dy <= 2; dy++) {
@@ -51,16 +51,16 @@ fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
             let near = max(abs(dx), abs(dy)) == 1;
             if near || (dx % 2 == 0 && dy % 2 == 0 && (dx != 0 || dy != 0)) {
                 let at = row + u32(clamp(x + dx, 0, last.x));
-                let a = left[at];
-                let b = right[at];
+                let a = full_left[at];
+                let b = full_right[at];
                 left_bits = (left_bits << 1u) | u32(a.y < l.y && (a.x >> 24u) == 0u);
                 right_bits = (right_bits << 1u) | u32(b.y < r.y && (b.x >> 24u) == 0u);
             }
         }
     }
     let out = (2u * id.y + j) * params.full_pitch + u32(x);
-    left_census_out[out] = select(NO_CENSUS, left_bits, (l.x >> 24u) == 0u);
-    right_census_out[out] = select(NO_CENSUS, right_bits, (r.x >> 24u) == 0u);
+    full_left_census_out[out] = select(NO_CENSUS, left_bits, (l.x >> 24u) == 0u);
+    full_right_census_out[out] = select(NO_CENSUS, right_bits, (r.x >> 24u) == 0u);
 }
 
 // The costs of a block around twice the disparity of its label. One invocation for four costs of a pixel of half the size.
@@ -80,18 +80,18 @@ fn costs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
         let row = (2u * id.y + j) * params.full_pitch;
         for (var i = 0u; i < 2u; i++) {
             let column = 2u * x + i;
-            let here = left_census[row + column];
+            let here = full_left_census[row + column];
             for (var k = 0; k < 4; k++) {
                 let other = i32(column) - first - k;
                 var there = NO_CENSUS;
                 if other >= 0 && other < 2 * i32(width) {
-                    there = right_census[row + u32(other)];
+                    there = full_right_census[row + u32(other)];
                 }
                 sums[k] += countOneBits(here ^ there);
             }
         }
     }
-    costs_out[4u * id.y * params.level.pixel_pitch + word * params.level.pixel_pitch + x] = pack_narrow(sums);
+    block_costs_out[4u * id.y * params.level.pixel_pitch + word * params.level.pixel_pitch + x] = pack_narrow(sums);
 }
 
 // The sum of a disparity, of those of four in a word of even and of odd ones.
@@ -122,10 +122,10 @@ fn fit(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index)
             let above = label - i32(optima[row + u32(u)].x & 0xffffu);
             if abs(above) <= 1 {
                 let at = 4u * row + u32(u);
-                var costs = vec3(costs_in[at], costs_in[at + pitch], costs_in[at + 2u * pitch]);
+                var costs = vec3(block_costs[at], block_costs[at + pitch], block_costs[at + 2u * pitch]);
                 // Two disparities further for each label.
                 if above >= 0 {
-                    let next = vec3(costs.yz, costs_in[at + 3u * pitch]);
+                    let next = vec3(costs.yz, block_costs[at + 3u * pitch]);
                     costs = select((costs >> vec3(16u)) | (next << vec3(16u)), next, above == 1);
                 }
                 even += costs & vec3(0xff00ffu);

@@ -17,8 +17,8 @@ struct Params {
 }
 
 @group(0) @binding(1) var<storage, read> fine_belief: array<u32>;
-@group(0) @binding(2) var<storage, read> coarse_belief: array<u32>;
-@group(0) @binding(3) var<storage, read_write> down: array<u32>;
+@group(0) @binding(2) var<storage, read> belief: array<u32>;
+@group(0) @binding(3) var<storage, read_write> fine_down: array<u32>;
 @group(0) @binding(4) var<storage, read_write> up: array<u32>;
 @group(0) @binding(5) var<storage, read> windows: array<u32>;
 @group(0) @binding(6) var<storage, read> fine_windows: array<u32>;
@@ -63,8 +63,8 @@ fn from_children(index: i32) -> vec4<u32> {
         child_word = label / PER_WORD;
         let at = children_at + vec4(word_of(label, params.fine.width));
         children = vec4(
-            less(fine_belief[at.x], down[at.x]), less(fine_belief[at.y], down[at.y]),
-            less(fine_belief[at.z], down[at.z]), less(fine_belief[at.w], down[at.w]));
+            less(fine_belief[at.x], fine_down[at.x]), less(fine_belief[at.y], fine_down[at.y]),
+            less(fine_belief[at.z], fine_down[at.z]), less(fine_belief[at.w], fine_down[at.w]));
     }
     let q = (children >> vec4(BITS * (label % PER_WORD))) & vec4(MOST);
     return select(max(q, child_floor) - child_floor, vec4(MOST), q == vec4(MOST));
@@ -74,7 +74,7 @@ fn from_parent(label: u32) -> u32 {
     if label / PER_WORD != parent_word {
         parent_word = label / PER_WORD;
         let at = parent_at + word_of(label, params.level.width);
-        parent = less(coarse_belief[at], up[at]);
+        parent = less(belief[at], up[at]);
     }
     let q = pick(parent, label);
     return select(max(q, parent_floor) - parent_floor, MOST, q == MOST);
@@ -143,15 +143,15 @@ fn emit_down(index: i32, sums: vec4<u32>, least: vec4<u32>) {
         let at = children_at + vec4(word_of(label, params.fine.width));
         // The first child is written last, because children outside the image share its position.
         if exists.w {
-            down[at.w] = down_words.w;
+            fine_down[at.w] = down_words.w;
         }
         if exists.z {
-            down[at.z] = down_words.z;
+            fine_down[at.z] = down_words.z;
         }
         if exists.y {
-            down[at.y] = down_words.y;
+            fine_down[at.y] = down_words.y;
         }
-        down[at.x] = down_words.x;
+        fine_down[at.x] = down_words.x;
         down_words = vec4<u32>();
     }
 }

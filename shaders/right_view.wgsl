@@ -14,7 +14,7 @@ struct Params {
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> belief: array<u32>;
 // label | belief << 16; all bits are set where no left pixel projects.
-@group(0) @binding(2) var<storage, read_write> labels: array<u32>;
+@group(0) @binding(2) var<storage, read_write> right_labels: array<u32>;
 
 @compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -36,5 +36,5 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             least = min(least, (b << 16u) | label);
         }
     }
-    labels[id.y * params.level.pixel_pitch + id.x] = least;
+    right_labels[id.y * params.level.pixel_pitch + id.x] = least;
 }

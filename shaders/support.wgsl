@@ -11,7 +11,7 @@ struct Params {
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> disparity: array<i32>;
 @group(0) @binding(2) var<storage, read> flags: array<u32>;
-@group(0) @binding(3) var<storage, read_write> supported: array<u32>;
+@group(0) @binding(3) var<storage, read_write> next_flags: array<u32>;
 
 // From the middle to the farthest place.
 const REACH: u32 = STEP * (PLACES / 2u);
@@ -48,5 +48,5 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             validity |= LOW_CONFIDENCE;
         }
     }
-    supported[id.y * pitch + id.x] = validity | (confidence << 8u);
+    next_flags[id.y * pitch + id.x] = validity | (confidence << 8u);
 }

@@ -29,15 +29,15 @@ struct Params {
 // What the right view sees: how near it is, from 1 on; 0 where nothing is known.
 @group(0) @binding(5) var<storage, read_write> shown: array<atomic<u32>>;
 // Half-size pixels: red | green << 8 | blue << 16, and ASKED where a pixel may take the vote.
-@group(0) @binding(6) var<storage, read_write> colours: array<u32>;
+@group(0) @binding(6) var<storage, read_write> half_colours: array<u32>;
 // By row, half-size pixel and label: own votes, then their sums along the row.
 @group(0) @binding(7) var<storage, read_write> sums: array<u32>;
 // The same, summed along columns.
 @group(0) @binding(8) var<storage, read_write> totals: array<u32>;
 // Votes in 1/256 px, NONE where there is none.
-@group(0) @binding(9) var<storage, read_write> votes: array<i32>;
+@group(0) @binding(9) var<storage, read_write> elected: array<i32>;
 // Weights of steps along a row, then along a column, by the difference in colour.
-@group(0) @binding(10) var<storage, read> weights: array<u32>;
+@group(0) @binding(10) var<storage, read> vote_weights: array<u32>;
 
 const ASKED: u32 = 0x1000000u;
 const NONE: i32 = -0x7fffffff;
@@ -73,7 +73,7 @@ fn colour(at: u32) -> vec3<u32> {
 
 // Colour of a half-size pixel.
 fn half_colour(at: u32) -> vec3<u32> {
-    return unpacked(colours[at]);
+    return unpacked(half_colours[at]);
 }
 
 // weight / 65536 of sum.
@@ -133,7 +133,7 @@ fn halve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
             }
         }
     }
-    colours[id.y * params.half_pitch + id.x] = packed(mean) | asked;
+    half_colours[id.y * params.half_pitch + id.x] = packed(mean) | asked;
 }
 
 // Own votes. One invocation per half-size pixel and label.
@@ -179,7 +179,7 @@ fn sum_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_i
     var at = id.y * params.sum_pitch + id.x;
     var sum = sums[at];
     for (var x = 1u; x < params.half_width; x++) {
-        let weight = weights[difference(half_colour(row + x - 1u), half_colour(row + x))];
+        let weight = vote_weights[difference(half_colour(row + x - 1u), half_colour(row + x))];
         at += params.labels;
         sum = sums[at] + weighted(weight, sum);
         sums[at] = sum;
@@ -187,7 +187,7 @@ fn sum_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_i
     sums[at] = sum >> VOTE_SHIFT;
     var carried = 0u;
     for (var x = params.half_width - 1u; x > 0u; x--) {
-        let weight = weights[difference(half_colour(row + x - 1u), half_colour(row + x))];
+        let weight = vote_weights[difference(half_colour(row + x - 1u), half_colour(row + x))];
         at -= params.labels;
         let before = sums[at];
         carried = weighted(weight, carried + (sum - weighted(weight, before)));
@@ -201,7 +201,7 @@ fn step_weight(x: u32, a: u32, b: u32) -> u32 {
     let first = params.first_summed;
     let one = half_colour((a - first) * params.half_pitch + x);
     let other = half_colour((b - first) * params.half_pitch + x);
-    return weights[COLOUR_DIFFERENCES + difference(one, other)];
+    return vote_weights[COLOUR_DIFFERENCES + difference(one, other)];
 }
 
 // Sums along columns, for the half-size pixels that are asked. One invocation per half-size pixel and label.
@@ -214,7 +214,7 @@ fn sum_columns(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     let first = params.first_summed;
     let x = id.x / params.labels;
     let y = params.band.first_row + id.y;
-    if (colours[(y - first) * params.half_pitch + x] & ASKED) == 0u {
+    if (half_colours[(y - first) * params.half_pitch + x] & ASKED) == 0u {
         return;
     }
     var from_above = 0u;
@@ -239,8 +239,8 @@ fn elect(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
         return;
     }
     let here = id.y * params.half_pitch + id.x;
-    votes[here] = NONE;
-    if (colours[here] & ASKED) == 0u {
+    elected[here] = NONE;
+    if (half_colours[here] & ASKED) == 0u {
         return;
     }
     let at = id.y * params.sum_pitch + id.x * params.labels;
@@ -271,7 +271,7 @@ fn elect(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
             offset = i32((512u * (below + slope - above) + slope) / (2u * slope)) - 256;
         }
     }
-    votes[here] = FRACTION * (params.level.low + 2 * i32(best)) + offset;
+    elected[here] = FRACTION * (params.level.low + 2 * i32(best)) + offset;
 }
 
 // Filled pixels take the vote of the half-size pixel around that looks most alike, and outvoted ones that of their own. One invocation
@@ -285,7 +285,7 @@ fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let at = id.y * params.level.pixel_pitch + id.x;
     let middle = vec2(id.x, params.band.first_row + id.y) >> vec2(1u);
     if (flags[at] & FILLED) == 0u {
-        let vote = votes[(middle.y - params.first_voted) * params.half_pitch + middle.x];
+        let vote = elected[(middle.y - params.first_voted) * params.half_pitch + middle.x];
         if may_be_outvoted(flags[at]) && vote != NONE && abs(vote - disparity[at]) > VOTE_OUTVOTES {
             disparity[at] = vote;
             flags[at] = OUTVOTED | FILLED;
@@ -297,7 +297,7 @@ fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     for (var y = max(middle.y, 1u) - 1u; y <= min(middle.y + 1u, params.half_height - 1u); y++) {
         for (var x = max(middle.x, 1u) - 1u; x <= min(middle.x + 1u, params.half_width - 1u); x++) {
             let half = (y - params.first_voted) * params.half_pitch + x;
-            let vote = votes[half];
+            let vote = elected[half];
             if vote != NONE {
                 let away = max(vec2(x, y), middle) - min(vec2(x, y), middle);
                 let unlike = difference(own, half_colour(half)) + VOTE_AWAY * (away.x + away.y);

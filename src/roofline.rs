@@ -35,14 +35,7 @@ pub fn label_updates(plan: &Plan, stage: Stage) -> u64 {
 pub fn bytes(plan: &Plan, stage: Stage, cells: &[u64]) -> u64 {
     let stored = |volume: Volume| {
         let rows = if matches!(volume, Volume::Dependency(_)) { plan.slots() } else { 1 };
-        let width = match volume {
-            Volume::Evidence(_) | Volume::Cost(0) => 1,
-            Volume::Cost(_) => 2,
-            Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) | Volume::Belief(_) => {
-                plan.volume_width.bytes()
-            }
-        };
-        cells[volume.level()] * (rows * width) as u64
+        cells[volume.level()] * (rows * volume.bytes(plan)) as u64
     };
     if stage.passes_messages() { stage.volumes(plan).map(stored).sum() } else { 0 }
 }

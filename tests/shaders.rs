@@ -8,7 +8,7 @@
 mod variants;
 
 use mrfgs::low_level::backend::Stage;
-use mrfgs::low_level::backend::gpu::{Kernel, MAX_LOOP_ITERATIONS, UniformLayout, binding_number, kernels};
+use mrfgs::low_level::backend::gpu::{Bound, Kernel, MAX_LOOP_ITERATIONS, UniformLayout, binding_number, kernels};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{DisparityRange, Method};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
@@ -150,7 +150,7 @@ fn check_bindings(kernel: &Kernel, source: &str) -> Result<(), String> {
         .filter_map(|(_, variable)| Some((Some(variable.binding?.binding), variable.name.as_deref()?)))
         .collect();
     let uniform = used.remove(&Some(0));
-    let bound = kernel.names.iter().map(|name| (binding_number(source, name), *name)).collect();
+    let bound = kernel.bound.iter().map(|b| (binding_number(source, b.name), b.name)).collect();
     if uniform.is_some() && used == bound {
         return Ok(());
     }
@@ -168,7 +168,8 @@ fn every_kernel_binds_what_its_entry_point_uses() {
 fn other_bindings_are_noticed() {
     let kernel = &kernels(Stage::Evidence(0), &PLANS[0])[0];
     let source = kernel.shader.source();
-    assert_eq!(kernel.names, ["cost", "evidence", "belief", "windows"]);
+    let names = |kernel: &Kernel| kernel.bound.iter().map(|bound| bound.name).collect::<Vec<_>>();
+    assert_eq!(names(kernel), ["cost", "evidence", "belief", "windows"]);
     check_bindings(kernel, &source).unwrap();
     check_bindings(kernel, &source.replace("@binding(3)", "@binding(9)")).unwrap();
     assert!(check_bindings(kernel, &source.replace("evidence", "proof")).is_err());
@@ -176,7 +177,7 @@ fn other_bindings_are_noticed() {
     let more = unused.to_owned() + &source;
     for names in [&["cost", "evidence", "belief"][..], &["cost", "evidence", "belief", "windows", "unused"]] {
         let mut changed = kernel.clone();
-        changed.names = names;
+        changed.bound = names.iter().map(|name| Bound { name, data: name, around: 0 }).collect();
         assert!(check_bindings(&changed, &more).is_err(), "{names:?}");
     }
 }

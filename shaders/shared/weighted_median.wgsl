@@ -25,7 +25,7 @@ struct Params {
 @group(0) @binding(3) var<storage, read> flags: array<u32>;
 // The weight that distance subtracts, by |dy| and |dx|.
 @group(0) @binding(4) var<storage, read> space: array<u32>;
-@group(0) @binding(5) var<storage, read_write> smoothed: array<i32>;
+@group(0) @binding(5) var<storage, read_write> next_disparity: array<i32>;
 
 const FIRST: vec4<u32> = vec4(1u, 2u, 3u, 4u);
 const SECOND: vec4<u32> = vec4(5u, 6u, 7u, 8u);

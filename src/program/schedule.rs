@@ -95,7 +95,7 @@ fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> 
 /// What follows the disparities: the stages that look at maps alone, in the order of their table, where the method takes them.
 #[must_use]
 pub fn post_processing(method: &Method) -> Vec<Step> {
-    let taken = Stage::OF_MAPS.iter().filter(|stage| (stage.descriptor().taken)(method));
+    let taken = Stage::OF_MAPS.iter().filter(|stage| stage.is_taken(method));
     taken.copied().map(Step::of).collect()
 }
 

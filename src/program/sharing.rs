@@ -2,7 +2,7 @@
 
 use super::Step;
 use crate::plan::Plan;
-use crate::stage::{Data, Volume};
+use crate::stage::{Data, Place, Volume};
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
@@ -11,22 +11,33 @@ fn lives(plan: &Plan, steps: &[Step]) -> HashMap<Data, RangeInclusive<usize>> {
     let mut lives = HashMap::new();
     for (at, step) in steps.iter().enumerate() {
         let Step::Run(run) = step else { continue };
-        for data in run.stages().flat_map(|stage| stage.reads(plan).chain(stage.writes())) {
-            let life = lives.entry(data).or_insert(at..=at);
-            *life = *life.start()..=at;
+        for stage in run.stages() {
+            for data in stage.reads(plan).chain(stage.writes()).chain(stage.needs(plan)) {
+                let life = lives.entry(data).or_insert(at..=at);
+                *life = *life.start()..=at;
+            }
         }
     }
     lives
 }
 
-/// The data that take the memory of volumes: of a level's messages its costs, on the CPU path, and of any volume that
-/// [`post-processing`](super::schedule::post_processing) does not read what counts votes, on a device.
-fn pairs(plan: &Plan) -> impl Iterator<Item = [Data; 2]> + use<> {
+/// Pairs of data in the same memory: on the CPU path the costs of a level in that of its messages, and on a device what the table of
+/// data [places](Place) in that of others.
+fn pairs(plan: &Plan) -> Vec<[Data; 2]> {
     let levels = plan.levels.len();
-    let costs = (1..levels).map(|z| [Volume::Cost(z), Volume::Dependency(z)].map(Data::Volume));
-    let volumes = [Volume::Evidence, Volume::Dependency, Volume::Down, Volume::Up, Volume::Belief];
-    let votes = (0..levels).flat_map(move |z| volumes.map(|volume| [Data::Votes, Data::Volume(volume(z))]));
-    costs.chain(votes)
+    let mut pairs: Vec<_> =
+        (1..levels).map(|z| [Volume::Cost(z), Volume::Dependency(z)].map(Data::Volume)).collect();
+    for data in Data::all(plan) {
+        match data.array(plan).place {
+            Place::Own => {}
+            Place::In(other) => pairs.push([data, other]),
+            Place::AnyVolume => {
+                let volumes = (0..levels).flat_map(Data::of_levels).filter(|data| data.volume().is_some());
+                pairs.extend(volumes.map(|volume| [data, volume]));
+            }
+        }
+    }
+    pairs
 }
 
 /// The steps of a frame, with graphs freed after the last stage that reads them; `plan` [shares](Plan::shares) memory where no two
@@ -38,10 +49,10 @@ pub fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
         [Some(a), Some(b)] => a.end() < b.start() || b.end() < a.start(),
         _ => true,
     };
-    plan.shares = pairs(plan).all(apart);
+    plan.shares = pairs(plan).into_iter().all(apart);
     let mut freed: HashMap<usize, Vec<Step>> = HashMap::new();
     for z in 0..plan.levels.len() {
-        let graph = Data::Graph(z);
+        let graph = Data::Members(z);
         if let Some(life) = lives.get(&graph) {
             freed.entry(*life.end()).or_default().push(Step::Free(graph));
         }
@@ -68,9 +79,9 @@ mod tests {
             assert!(plan.shares, "{preset}");
             for z in 0..plan.levels.len() {
                 let reads = |step: &Step| {
-                    step.stage().is_some_and(|stage| stage.reads(&plan).any(|data| data == Data::Graph(z)))
+                    step.stage().is_some_and(|stage| stage.reads(&plan).any(|data| data == Data::Members(z)))
                 };
-                let freed = shared.iter().position(|step| *step == Step::Free(Data::Graph(z))).unwrap();
+                let freed = shared.iter().position(|step| *step == Step::Free(Data::Members(z))).unwrap();
                 assert!(!shared[freed..].iter().any(reads), "{preset}, level {z}");
             }
             let kept: Vec<_> = shared.into_iter().filter(|step| !matches!(step, Step::Free(_))).collect();

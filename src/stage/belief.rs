@@ -21,11 +21,8 @@ use crate::plan::GRAPH_WINDOW;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |z| {
-        [
-            volumes(&[Volume::Evidence(z), Volume::Dependency(z), Volume::Down(z), Volume::Up(z)]),
-            vec![Data::Graph(z)],
-        ]
-        .concat()
+        let messages = [Volume::Evidence(z), Volume::Dependency(z), Volume::Down(z), Volume::Up(z)];
+        [volumes(&messages), vec![Data::Members(z), Data::Incoming(z), Data::Windows(z)]].concat()
     },
     writes: |z| volumes(&[Volume::Belief(z)]),
     reach: Some(GRAPH_WINDOW / 2),

@@ -10,7 +10,12 @@
 //! The map has settled where this is not the first time and the change is at most
 //! [`settled_change`](crate::plan::Plan::settled_change), if there is one.
 
-use super::{Descriptor, Volume, volumes};
+use super::{Data, Descriptor, Volume};
 
-pub(super) const ROW: Descriptor =
-    Descriptor { reads: |_| volumes(&[Volume::Belief(0)]), cell: 0.2, ..Descriptor::NONE };
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |_| vec![Data::Volume(Volume::Belief(0)), Data::LabelMap, Data::Convergence],
+    writes: |_| vec![Data::LabelMap, Data::Convergence],
+    needs: |_| vec![Data::Squares, Data::RowSums, Data::Groups],
+    cell: 0.2,
+    ..Descriptor::NONE
+};

@@ -5,7 +5,12 @@
 //! [`outside_cost`](crate::plan::Plan::outside_cost). Elsewhere
 //! [`MatchingCost`](crate::options::MatchingCost) defines it.
 
-use super::{Descriptor, Volume, volumes};
+use super::{Data, Descriptor, Volume, volumes};
 
-pub(super) const ROW: Descriptor =
-    Descriptor { writes: |_| volumes(&[Volume::Cost(0)]), cell: 0.7, ..Descriptor::NONE };
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |_| vec![Data::LEFT, Data::Right],
+    writes: |_| volumes(&[Volume::Cost(0)]),
+    needs: |_| vec![Data::LeftCensus, Data::RightCensus, Data::Contrast],
+    cell: 0.7,
+    ..Descriptor::NONE
+};

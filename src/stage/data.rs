@@ -1,6 +1,14 @@
-//! What a backend holds of a match: volumes and maps.
+//! What a match holds: the one table of volumes, maps, graphs and scratch memory.
+//!
+//! A row of [`Data::array`] says how a device stores a datum: the name by which shaders bind it, its words in a row, and how its rows lie
+//! over the image. Buffers, bindings, the memory of a plan, and the tests that hold descriptors against shaders follow from it.
 
-use crate::plan::Plan;
+use super::Stage;
+use crate::plan::patches::{PATCH, PATCH_WORDS, patches};
+use crate::plan::votes::Votes;
+use crate::plan::{Plan, ROW_ALIGN};
+use crate::weights::{MedianWeights, patch_weights, vote_weights};
+use std::ops::Range;
 
 /// Stands for "no label", in the right view where no left pixel projects.
 pub const NO_LABEL: u16 = u16::MAX;
@@ -34,6 +42,16 @@ impl Volume {
             Self::Down(z) => z + 1 < levels,
             Self::Up(z) => z > 0,
             other => other.level() < levels,
+        }
+    }
+
+    /// Bytes of a value, as it is stored.
+    #[must_use]
+    pub fn bytes(self, plan: &Plan) -> usize {
+        match self {
+            Self::Cost(0) | Self::Evidence(_) => 1,
+            Self::Cost(_) => 2,
+            _ => plan.volume_width.bytes(),
         }
     }
 
@@ -107,6 +125,12 @@ impl Map {
         [&Self::MATCHED, full].concat()
     }
 
+    /// Words that a device stores a pixel in, with the other maps in the same array.
+    #[must_use]
+    pub fn words(self) -> usize {
+        if matches!(self, Self::Label | Self::Best | Self::RunnerUp) { 2 } else { 1 }
+    }
+
     /// (width, height) under `plan`, in pixels. At full size there are whole blocks of 2 x 2 pixels.
     #[must_use]
     pub fn size(self, plan: &Plan) -> (usize, usize) {
@@ -115,20 +139,479 @@ impl Map {
     }
 }
 
-/// What stages read and write.
+/// Anything that stages read or write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Data {
     /// A volume.
     Volume(Volume),
     /// A map.
     Map(Map),
-    /// The graph of a level: the members of its factors.
-    Graph(usize),
-    /// The sums of votes, by half-size pixel and every second label.
-    Votes,
+    /// What members are chosen by, at a level: at level 0 the left view.
+    Guide(usize),
+    /// The guide of a level until it is complete.
+    NextGuide(usize),
+    /// Members of the dependency factors of a level.
+    Members(usize),
+    /// The factors that hold each pixel of a level: its members, transposed.
+    Incoming(usize),
+    /// Label windows of a level: first label | number of labels with padding << 16.
+    Windows(usize),
+    /// Label windows of a level that hold all labels.
+    FullWindows(usize),
+    /// Lowest and highest candidate of each pixel of a level, for the windows of the next finer one.
+    Candidates(usize),
+    /// First and last label of each pixel of a level.
+    LabelRange(usize),
+    /// The right view.
+    Right,
+    /// The left view on its way to a device, in whole 8-bit levels: one word a pixel.
+    LeftWords,
+    /// The right view on its way to a device.
+    RightWords,
+    /// Census of the left view.
+    LeftCensus,
+    /// Census of the right view.
+    RightCensus,
+    /// Weight of colour in the matching cost.
+    Contrast,
+    /// The label map that the next one is compared with.
+    LabelMap,
+    /// Squared differences of two label maps.
+    Squares,
+    /// Their sums, by row: lower and upper half.
+    RowSums,
+    /// Whether the label map has settled.
+    Convergence,
+    /// Workgroups of the dispatches that become empty once it has.
+    Groups,
+    /// Output of a map stage that reads around a pixel, until it replaces [`Map::Disparity`].
+    NextDisparity,
+    /// The same for [`Map::Validity`] and [`Map::Confidence`].
+    NextFlags,
+    /// Union-find forest of the speckle filter.
+    Parents,
+    /// Sizes of its regions.
+    Sizes,
+    /// Whether each row holds a valid pixel.
+    KnownRows,
+    /// The row that each row takes its values from.
+    SourceRows,
+    /// The labels that the right view sees at each pixel, for votes.
+    Shown,
+    /// Colours of half-size pixels.
+    HalfColours,
+    /// The label that each half-size pixel votes for.
+    Elected,
+    /// Votes of a band of half-size rows and the rows around it, summed along rows.
+    Sums,
+    /// Votes of a band, summed along columns too.
+    Totals,
+    /// Weights of votes by colour.
+    VoteWeights,
+    /// Moments and colours of patches.
+    Patches,
+    /// Weights of patches by colour.
+    PatchShares,
+    /// Spatial weights of the median.
+    MedianWeights,
+    /// Spatial weights of the median of filled pixels.
+    FillWeights,
+    /// The left view at full size, where the pair is matched at half of it.
+    FullLeft,
+    /// The right view at full size.
+    FullRight,
+    /// Census of the left view at full size.
+    FullLeftCensus,
+    /// Census of the right view at full size.
+    FullRightCensus,
+    /// Costs of the four full-size pixels of a pixel, around its label.
+    BlockCosts,
+}
+
+/// How the rows of an array lie over the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// Rows of pixels of a level.
+    Level(usize),
+    /// Rows of pixels of the full size of a pair that is matched at half of it.
+    Full,
+    /// Rows of pixels of half the size of level 0.
+    Half,
+    /// Rows of patches.
+    Patches,
+    /// A table without rows of the image, in one piece.
+    Table,
+}
+
+impl Extent {
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(self, plan: &Plan) -> usize {
+        let height = plan.levels[0].height;
+        match self {
+            Self::Level(z) => plan.levels[z].height,
+            Self::Full => 2 * height,
+            Self::Half => height.div_ceil(2),
+            Self::Patches => height.div_ceil(PATCH),
+            Self::Table => 1,
+        }
+    }
+
+    /// Rows of the full size, twice that of level 0, that a row spans.
+    fn step(self) -> usize {
+        match self {
+            Self::Full | Self::Table => 1,
+            Self::Level(z) => 2 << z,
+            Self::Half => 4,
+            Self::Patches => 2 * PATCH,
+        }
+    }
+
+    /// The rows that show what `rows` of `other` show, with up to `around` more on either side.
+    #[must_use]
+    pub fn rows_of(self, plan: &Plan, rows: &Range<u32>, other: Self, around: u32) -> Range<u32> {
+        let (height, own, theirs) = (self.rows(plan) as u32, self.step() as u32, other.step() as u32);
+        if self == Self::Table {
+            return 0..height;
+        }
+        let (start, end) = (rows.start * theirs / own, (rows.end * theirs).div_ceil(own));
+        start.saturating_sub(around)..(end + around).min(height)
+    }
+}
+
+/// Where an array lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// In memory of its own.
+    Own,
+    /// In the memory of this, which is never needed at the same time.
+    In(Data),
+    /// In that of any volume that post-processing does not read, where one is large enough.
+    AnyVolume,
+}
+
+/// What an array holds when a match begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// Whatever the last match has left: a stage writes it before one reads it.
+    Anything,
+    /// Zeros.
+    Zero,
+    /// A part of the pair or what the front end knows of it.
+    Given,
+    /// The same in every match of the plan.
+    Constant,
+}
+
+/// How a device stores a datum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Array {
+    /// What shaders call it; a prefix or suffix says which part they mean (see [`Data::bound`]).
+    pub name: &'static str,
+    /// 32-bit words in a row, padding included.
+    pub words: usize,
+    /// How its rows lie over the image.
+    pub extent: Extent,
+    /// The rows that are held: where a stage works on a band at a time, those of the largest band, from its first row on.
+    pub rows: usize,
+    /// Whether only a band is held.
+    pub of_band: bool,
+    /// What it holds when a match begins.
+    pub start: Start,
+    /// Where it lies.
+    pub place: Place,
+}
+
+impl Array {
+    const fn new(name: &'static str, words: usize, extent: Extent, rows: usize) -> Self {
+        Self { name, words, extent, rows, of_band: false, start: Start::Anything, place: Place::Own }
+    }
+
+    /// One word for each of so many entries.
+    const fn table(name: &'static str, words: usize) -> Self {
+        Self::new(name, words, Extent::Table, 1)
+    }
+
+    const fn starting(self, start: Start) -> Self {
+        Self { start, ..self }
+    }
+
+    const fn of_band(self, rows: usize) -> Self {
+        Self { rows, of_band: true, ..self }
+    }
+
+    const fn place(self, place: Place) -> Self {
+        Self { place, ..self }
+    }
+
+    /// Its size in bytes, all rows held once.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        4 * self.words as u64 * self.rows as u64
+    }
+}
+
+/// Words of a row that begins at a multiple of [`ROW_ALIGN`] bytes.
+fn padded(words: usize) -> usize {
+    words.next_multiple_of(ROW_ALIGN / 4)
 }
 
 impl Data {
+    /// The left view.
+    pub const LEFT: Self = Self::Guide(0);
+
+    /// How a device stores it: the table.
+    #[must_use]
+    #[rustfmt::skip]
+    pub fn array(self, plan: &Plan) -> Array {
+        use Start::{Constant, Given, Zero};
+        let votes = || Votes::of(plan);
+        let width = plan.levels[0].width;
+        let rows = |name, words, extent: Extent| Array::new(name, words, extent, extent.rows(plan));
+        // Words of each pixel of a level, of level 0, and of the full size.
+        let level = |name, z: usize, words: usize| rows(name, words * padded(plan.levels[z].width), Extent::Level(z));
+        let fine = |name, words: usize| level(name, 0, words);
+        let full = |name, words: usize| rows(name, words * padded(2 * width), Extent::Full);
+        // So many slots of labels a pixel.
+        let slots = |name, volume: Volume, slots: usize| {
+            let z = volume.level();
+            let l = &plan.levels[z];
+            rows(name, volume.bytes(plan) * padded(slots * l.width * l.quads()), Extent::Level(z))
+        };
+        let windows = |name, z: usize| {
+            let (runs, rows) = plan.levels[z].windows();
+            Array::table(name, padded(runs * rows))
+        };
+        let height = plan.levels[0].height;
+        let constant = |name| Array::table(name, self.constant(plan).len()).starting(Constant);
+        let votes_of = |name, labels: usize| {
+            rows(name, padded(votes().width * labels), Extent::Half).place(Place::AnyVolume)
+        };
+        match self {
+            // datum                           name                words a pixel, and of which rows
+            Self::Volume(volume @ Volume::Cost(_)) => slots("cost", volume, 1),
+            Self::Volume(volume @ Volume::Evidence(_)) => slots("evidence", volume, 1),
+            Self::Volume(volume @ Volume::Dependency(_)) => slots("dependency", volume, plan.slots()).starting(Zero),
+            Self::Volume(volume @ Volume::Down(_)) => slots("down", volume, 1).starting(Zero),
+            Self::Volume(volume @ Volume::Up(_)) => slots("up", volume, 1).starting(Zero),
+            Self::Volume(volume @ Volume::Belief(_)) => slots("belief", volume, 1),
+            Self::Guide(0) => level("left", 0, 4).starting(Given),
+            Self::Guide(z) => level("guide", z, 4),
+            Self::NextGuide(z) => level("next_guide", z, 4),
+            Self::Members(z) => {
+                rows("members", padded(plan.levels[z].width * plan.neighbours.div_ceil(4)), Extent::Level(z))
+            }
+            Self::Incoming(z) => level("incoming", z, 2),
+            Self::Windows(z) => windows("windows", z),
+            Self::FullWindows(z) => windows("full_windows", z).starting(Constant),
+            Self::Candidates(z) => level("candidates", z, 1),
+            Self::LabelRange(z) => level("label_range", z, 1).starting(Given),
+            Self::Right => fine("right", 4).starting(Given),
+            Self::LeftWords => fine("left_words", 1).starting(Given).place(Place::In(Self::NextDisparity)),
+            Self::RightWords => fine("right_words", 1).starting(Given).place(Place::In(Self::NextFlags)),
+            Self::LeftCensus => fine("left_census", 2),
+            Self::RightCensus => fine("right_census", 2),
+            Self::Contrast => fine("contrast", 1),
+            Self::LabelMap => fine("label_map", 1).starting(Zero),
+            Self::Squares => fine("squares", 1),
+            Self::RowSums => Array::table("row_sums", 2 * height),
+            Self::Convergence => Array::table("convergence", 5).starting(Zero),
+            Self::Groups => Array::table("groups", 0),
+            Self::Map(Map::Label | Map::Best | Map::RunnerUp) => fine("optima", Map::Label.words()),
+            Self::Map(Map::RightLabel | Map::RightBest) => fine("right_labels", 1),
+            Self::Map(Map::Raw) => fine("raw", 1),
+            Self::Map(Map::Disparity) => fine("disparity", 1),
+            Self::Map(Map::Validity | Map::Confidence) => fine("flags", 1),
+            Self::NextDisparity => fine("next_disparity", 1),
+            Self::NextFlags => fine("next_flags", 1),
+            Self::Parents => fine("parents", 1).of_band(height),
+            Self::Sizes => fine("sizes", 1).of_band(height),
+            Self::KnownRows => Array::table("known_rows", height),
+            Self::SourceRows => Array::table("source_rows", height),
+            Self::Shown => fine("shown", 1).place(Place::In(Self::NextFlags)),
+            Self::HalfColours => votes_of("half_colours", 1),
+            Self::Elected => votes_of("elected", 1),
+            Self::Sums => votes_of("sums", votes().labels).of_band(votes().summed()),
+            Self::Totals => votes_of("totals", votes().labels).of_band(votes().band),
+            Self::VoteWeights => constant("vote_weights"),
+            Self::Patches => {
+                let words = padded(PATCH_WORDS * patches(plan).0);
+                rows("patches", words, Extent::Patches).place(Place::AnyVolume)
+            }
+            Self::PatchShares => constant("patch_shares"),
+            Self::MedianWeights => constant("median_weights"),
+            Self::FillWeights => constant("fill_weights"),
+            Self::FullLeft => full("full_left", 2).starting(Given),
+            Self::FullRight => full("full_right", 2).starting(Given),
+            Self::FullLeftCensus => full("full_left_census", 1),
+            Self::FullRightCensus => full("full_right_census", 1),
+            Self::BlockCosts => fine("block_costs", 4),
+            Self::Map(Map::FullRaw) => full("full_raw", 1),
+            Self::Map(Map::FullDisparity) => full("full_disparity", 1),
+            Self::Map(Map::FullValidity | Map::FullConfidence) => full("full_flags", 1),
+        }
+    }
+
+    /// The words of an array that is the same in every match of the plan, or none.
+    #[must_use]
+    pub fn constant(self, plan: &Plan) -> Vec<u32> {
+        match self {
+            Self::FullWindows(z) => {
+                let (runs, rows) = plan.levels[z].windows();
+                let mut words = vec![(plan.levels[z].stride as u32) << 16; runs * rows];
+                words.resize(padded(words.len()), 0);
+                words
+            }
+            Self::VoteWeights => vote_weights().concat(),
+            Self::PatchShares => patch_weights(),
+            Self::MedianWeights => MedianWeights::of(&plan.method).words(),
+            // What distance subtracts is the same for all steps.
+            Self::FillWeights => MedianWeights::of_filled(&plan.method, [0; 2]).words(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The level of data that each level has.
+    #[must_use]
+    pub fn level(self) -> Option<usize> {
+        match self {
+            Self::Volume(volume) => Some(volume.level()),
+            Self::Guide(z)
+            | Self::NextGuide(z)
+            | Self::Members(z)
+            | Self::Incoming(z)
+            | Self::Windows(z)
+            | Self::FullWindows(z)
+            | Self::Candidates(z)
+            | Self::LabelRange(z) => Some(z),
+            _ => None,
+        }
+    }
+
+    /// Data of a level, coarser levels of which may lie beside it in one buffer, so that one dispatch sees all of them.
+    #[must_use]
+    pub fn of_levels(z: usize) -> [Self; 9] {
+        [
+            Self::Volume(Volume::Evidence(z)),
+            Self::Volume(Volume::Dependency(z)),
+            Self::Volume(Volume::Down(z)),
+            Self::Volume(Volume::Up(z)),
+            Self::Volume(Volume::Belief(z)),
+            Self::Windows(z),
+            Self::Guide(z),
+            Self::Members(z),
+            Self::Incoming(z),
+        ]
+    }
+
+    /// All other data of a level.
+    #[must_use]
+    pub fn of_level(z: usize) -> [Self; 5] {
+        [
+            Self::Volume(Volume::Cost(z)),
+            Self::FullWindows(z),
+            Self::Candidates(z),
+            Self::LabelRange(z),
+            Self::NextGuide(z),
+        ]
+    }
+
+    /// All data that belong to no level.
+    #[must_use]
+    pub fn of_match() -> Vec<Self> {
+        let maps = Map::MATCHED.into_iter().chain(Map::FULL).map(Self::Map);
+        let others = [
+            Self::Right,
+            Self::LeftCensus,
+            Self::RightCensus,
+            Self::Contrast,
+            Self::LabelMap,
+            Self::Squares,
+            Self::RowSums,
+            Self::Convergence,
+            Self::Groups,
+            Self::NextDisparity,
+            Self::NextFlags,
+            Self::LeftWords,
+            Self::RightWords,
+            Self::Shown,
+            Self::Parents,
+            Self::Sizes,
+            Self::KnownRows,
+            Self::SourceRows,
+            Self::HalfColours,
+            Self::Elected,
+            Self::Sums,
+            Self::Totals,
+            Self::VoteWeights,
+            Self::Patches,
+            Self::PatchShares,
+            Self::MedianWeights,
+            Self::FillWeights,
+            Self::FullLeft,
+            Self::FullRight,
+            Self::FullLeftCensus,
+            Self::FullRightCensus,
+            Self::BlockCosts,
+        ];
+        maps.chain(others).collect()
+    }
+
+    /// Everything that a match by `plan` holds.
+    #[must_use]
+    pub fn all(plan: &Plan) -> Vec<Self> {
+        let levels = (0..plan.levels.len()).flat_map(|z| Self::of_levels(z).into_iter().chain(Self::of_level(z)));
+        levels.chain(Self::of_match()).filter(|data| data.is_there(plan)).collect()
+    }
+
+    /// Whether a match by `plan` holds it.
+    #[must_use]
+    pub fn is_there(self, plan: &Plan) -> bool {
+        let levels = plan.levels.len();
+        match self {
+            Self::Volume(volume) => volume.is_there(levels),
+            Self::NextGuide(z) | Self::Candidates(z) => (1..levels).contains(&z),
+            Self::LabelRange(z) => z < levels && plan.limits_labels(),
+            Self::FullLeft
+            | Self::FullRight
+            | Self::FullLeftCensus
+            | Self::FullRightCensus
+            | Self::BlockCosts
+            | Self::Map(Map::FullRaw | Map::FullDisparity | Map::FullValidity | Map::FullConfidence) => {
+                plan.full.is_some()
+            }
+            Self::HalfColours | Self::Elected | Self::Sums | Self::Totals | Self::VoteWeights => {
+                Stage::VoteFill.is_taken(&plan.method)
+            }
+            Self::Patches | Self::PatchShares => Stage::FarPlane.is_taken(&plan.method),
+            other => other.level().is_none_or(|z| z < levels),
+        }
+    }
+
+    /// The name and the level of the array that a kernel at `level` binds by this name: that of the table, with `fine_` before it at the
+    /// next finer level, `source_` before it for other rows of it, and `_in` or `_out` behind it where one shader reads and writes it
+    /// in turn.
+    #[must_use]
+    pub fn place_of(name: &str, level: usize) -> (&str, usize) {
+        let name = name.strip_suffix("_in").or(name.strip_suffix("_out")).unwrap_or(name);
+        let name = name.strip_prefix("source_").unwrap_or(name);
+        let (name, level) = match name.strip_prefix("fine_") {
+            Some(name) => (name, level.saturating_sub(1)),
+            None => (name, level),
+        };
+        // The left view is the guide of level 0.
+        if (name, level) == ("guide", 0) { ("left", 0) } else { (name, level) }
+    }
+
+    /// The data whose array a kernel at `level` binds by this name. Maps may share an array.
+    #[must_use]
+    pub fn bound(plan: &Plan, name: &str, level: usize) -> Vec<Self> {
+        let (name, level) = Self::place_of(name, level);
+        let is_meant =
+            |data: &Self| data.level().is_none_or(|z| z == level) && data.array(plan).name == name;
+        Self::all(plan).into_iter().filter(is_meant).collect()
+    }
+
     /// The volume that it is, if it is one.
     #[must_use]
     pub fn volume(self) -> Option<Volume> {

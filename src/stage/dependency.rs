@@ -47,7 +47,10 @@ use super::{Data, Descriptor, Volume, volumes};
 use crate::plan::GRAPH_WINDOW;
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |z| [volumes(&[Volume::Belief(z), Volume::Dependency(z)]), vec![Data::Graph(z)]].concat(),
+    reads: |z| {
+        let volumes = volumes(&[Volume::Belief(z), Volume::Dependency(z)]);
+        [volumes, vec![Data::Members(z), Data::Windows(z)]].concat()
+    },
     writes: |z| volumes(&[Volume::Dependency(z)]),
     reach: Some(GRAPH_WINDOW / 2),
     joins: true,

@@ -33,7 +33,7 @@
 //! [`FullConfidence`](crate::backend::Map::FullConfidence) are those of q*. Where p is masked, they are
 //! [`MASKED`](crate::maps::flag::MASKED) and 0.
 
-use super::{Descriptor, Map, maps};
+use super::{Data, Descriptor, Map, maps};
 use crate::options::MatchSize;
 
 /// What each pixel of the full size that a pixel is away counts as a difference in colour, in 8-bit levels.
@@ -42,7 +42,10 @@ pub const AWAY: i32 = 8;
 pub const NEAR: i32 = 64;
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |_| maps(&[Map::Raw, Map::Disparity, Map::Validity, Map::Confidence]),
+    reads: |_| {
+        let maps = maps(&[Map::Raw, Map::Disparity, Map::Validity, Map::Confidence]);
+        [maps, vec![Data::LEFT, Data::FullLeft]].concat()
+    },
     writes: |_| maps(&Map::FULL),
     taken: |method| method.schedule.match_size == MatchSize::Half,
     pixel: 60.0,

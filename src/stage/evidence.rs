@@ -15,10 +15,10 @@
 //!
 //! Evidence at labels that the pixel does not have is not defined.
 
-use super::{Descriptor, Volume, volumes};
+use super::{Data, Descriptor, Volume, volumes};
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |z| volumes(&[Volume::Cost(z)]),
+    reads: |z| vec![Data::Volume(Volume::Cost(z)), Data::Windows(z)],
     writes: |z| volumes(&[Volume::Evidence(z), Volume::Belief(z)]),
     reach: Some(0),
     cell: 0.6,

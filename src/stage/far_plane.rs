@@ -85,12 +85,16 @@
 //!
 //! (Moments and not sums: however far they come, they fit in 32 bits.)
 
-use super::{Descriptor, Map, maps};
+use super::{Data, Descriptor, Map, maps};
 use crate::options::{Fill, MatchSize};
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
+    reads: |_| {
+        let maps = maps(&[Map::Disparity, Map::Validity, Map::Confidence]);
+        [maps, vec![Data::LEFT, Data::PatchShares]].concat()
+    },
     writes: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
+    needs: |_| vec![Data::Patches],
     // At half size a patch would see too much at once.
     taken: |method| {
         let refinement = &method.refinement;

@@ -14,12 +14,13 @@
 //!
 //! Where no pixel at all is valid, nothing is filled.
 
-use super::{Descriptor, Map, maps};
+use super::{Data, Descriptor, Map, maps};
 use crate::options::Fill;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Disparity, Map::Validity]),
     writes: |_| maps(&[Map::Disparity, Map::Validity]),
+    needs: |_| vec![Data::KnownRows, Data::SourceRows, Data::NextDisparity, Data::NextFlags],
     taken: |method| method.refinement.fill != Fill::None,
     pixel: 4.0,
     ..Descriptor::NONE

@@ -11,12 +11,13 @@
 //! - A plane looks at all of them.
 //! - The weights are those [`of_filled`](crate::weights::MedianWeights::of_filled) pixels.
 
-use super::{Descriptor, Map, maps};
+use super::{Data, Descriptor, Map, maps};
 use crate::options::Fill;
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |_| maps(&[Map::Disparity, Map::Validity]),
+    reads: |_| [maps(&[Map::Disparity, Map::Validity]), vec![Data::LEFT, Data::FillWeights]].concat(),
     writes: |_| maps(&[Map::Disparity]),
+    needs: |_| vec![Data::NextDisparity],
     taken: |method| method.refinement.fill == Fill::Votes,
     pixel: 48.0,
     ..Descriptor::NONE

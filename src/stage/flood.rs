@@ -4,23 +4,11 @@
 //! (They are one stage so that a belief can be summed while its messages are at hand; the values
 //! are those of the two stages in turn.)
 
-use super::{Data, Descriptor, Volume, volumes};
+use super::{Descriptor, belief, dependency};
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |z| {
-        [
-            volumes(&[
-                Volume::Belief(z),
-                Volume::Evidence(z),
-                Volume::Dependency(z),
-                Volume::Down(z),
-                Volume::Up(z),
-            ]),
-            vec![Data::Graph(z)],
-        ]
-        .concat()
-    },
-    writes: |z| volumes(&[Volume::Dependency(z), Volume::Belief(z)]),
+    reads: |z| [(dependency::ROW.reads)(z), (belief::ROW.reads)(z)].concat(),
+    writes: |z| [(dependency::ROW.writes)(z), (belief::ROW.writes)(z)].concat(),
     joins: true,
     cell: 0.9,
     ..Descriptor::NONE

@@ -9,10 +9,10 @@
 //! [`label_ranges`](crate::front::Prepared::label_ranges); [`COST_MAX`](crate::plan::COST_MAX) is
 //! the highest cost there is. All other costs stay.
 
-use super::{Descriptor, Volume, volumes};
+use super::{Data, Descriptor, Volume, volumes};
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |z| volumes(&[Volume::Cost(z)]),
+    reads: |z| vec![Data::Volume(Volume::Cost(z)), Data::LabelRange(z)],
     writes: |z| volumes(&[Volume::Cost(z)]),
     cell: 0.5,
     ..Descriptor::NONE

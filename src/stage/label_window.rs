@@ -36,7 +36,12 @@
 //! labels). For every stage, the belief of any other label is infinite:
 //! [`VolumeWidth::most`](crate::plan::VolumeWidth::most).
 
-use super::{Descriptor, Volume, volumes};
+use super::{Data, Descriptor, Volume};
 
-pub(super) const ROW: Descriptor =
-    Descriptor { reads: |z| volumes(&[Volume::Belief(z + 1)]), pixel: 4.0, ..Descriptor::NONE };
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |z| vec![Data::Volume(Volume::Belief(z + 1)), Data::Windows(z + 1), Data::LabelRange(z)],
+    writes: |z| vec![Data::Windows(z)],
+    needs: |z| vec![Data::Candidates(z + 1)],
+    pixel: 4.0,
+    ..Descriptor::NONE
+};

@@ -17,10 +17,10 @@
 //! [`left_right_check`](crate::options::RefinementOptions::left_right_check) says whether the check
 //! is off. A right pixel without a label differs from all.
 
-use super::{Descriptor, Map, maps};
+use super::{Data, Descriptor, Map, maps};
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |_| maps(&[Map::Label, Map::RightLabel]),
+    reads: |_| [maps(&[Map::Label, Map::RightLabel]), vec![Data::LEFT]].concat(),
     writes: |_| maps(&[Map::Validity]),
     pixel: 5.0,
     ..Descriptor::NONE

@@ -17,12 +17,13 @@
 //!                                                      >= sum of w over all places
 //!    ```
 
-use super::{Descriptor, Map, maps};
+use super::{Data, Descriptor, Map, maps};
 use crate::options::Median;
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |_| maps(&[Map::Disparity, Map::Validity]),
+    reads: |_| [maps(&[Map::Disparity, Map::Validity]), vec![Data::LEFT, Data::MedianWeights]].concat(),
     writes: |_| maps(&[Map::Disparity]),
+    needs: |_| vec![Data::NextDisparity],
     taken: |method| method.refinement.median != Median::Off && !method.refinement.plane,
     pixel: 60.0,
     ..Descriptor::NONE

@@ -10,7 +10,7 @@ mod map_set;
 use crate::options::Method;
 use crate::plan::Plan;
 pub(crate) use data::PaddedRows;
-pub use data::{Data, Map, NO_LABEL, NO_RUNNER_UP, Volume, volume_shape};
+pub use data::{Array, Data, Extent, Map, NO_LABEL, NO_RUNNER_UP, Place, Start, Volume, volume_shape};
 pub(crate) use map_set::{MapSet, Optimum};
 
 /// Calls the macro `$then` with all rows: the stages that run at a level and those that run on the volumes of level 0, of both kinds
@@ -41,6 +41,8 @@ pub struct Descriptor {
     pub reads: fn(usize) -> Vec<Data>,
     /// What it writes at a level.
     pub writes: fn(usize) -> Vec<Data>,
+    /// Scratch memory of a device: written before it is read, and not needed once the stage has run.
+    pub needs: fn(usize) -> Vec<Data>,
     /// How many rows around its own, of its level, it reads; `None` where it does not go row by row. (Resolution goes by rows of
     /// the coarser level, and reads and writes those of their children.)
     pub reach: Option<usize>,
@@ -59,6 +61,7 @@ impl Descriptor {
     pub(crate) const NONE: Self = Self {
         reads: |_| Vec::new(),
         writes: |_| Vec::new(),
+        needs: |_| Vec::new(),
         reach: None,
         joins: false,
         taken: |_| true,
@@ -177,20 +180,33 @@ macro_rules! define {
 for_every_stage!(define);
 
 impl Stage {
-    /// What it reads, of what there is under `plan`.
-    pub fn reads(self, plan: &Plan) -> impl Iterator<Item = Data> + use<> {
-        let levels = plan.levels.len();
-        let all = (self.descriptor().reads)(self.level().unwrap_or(0)).into_iter();
-        all.filter(move |data| data.volume().is_none_or(|volume| volume.is_there(levels)))
+    /// The data that it reads, of those that there are under `plan`.
+    pub fn reads(self, plan: &Plan) -> impl Iterator<Item = Data> + use<'_> {
+        self.of_plan(self.descriptor().reads, plan)
     }
 
-    /// What it writes.
+    /// The data that it writes.
     pub fn writes(self) -> impl Iterator<Item = Data> + use<> {
         (self.descriptor().writes)(self.level().unwrap_or(0)).into_iter()
     }
 
+    /// Its scratch memory on a device, of what there is under `plan`.
+    pub fn needs(self, plan: &Plan) -> impl Iterator<Item = Data> + use<'_> {
+        self.of_plan(self.descriptor().needs, plan)
+    }
+
+    fn of_plan(self, data: fn(usize) -> Vec<Data>, plan: &Plan) -> impl Iterator<Item = Data> + use<'_> {
+        data(self.level().unwrap_or(0)).into_iter().filter(|data| data.is_there(plan))
+    }
+
+    /// Whether a match by `method` runs it. Only asked of stages that look at maps alone.
+    #[must_use]
+    pub fn is_taken(self, method: &Method) -> bool {
+        (self.descriptor().taken)(method)
+    }
+
     /// The volumes that it reads or writes, each once a use.
-    pub fn volumes(self, plan: &Plan) -> impl Iterator<Item = Volume> + use<> {
+    pub fn volumes(self, plan: &Plan) -> impl Iterator<Item = Volume> + use<'_> {
         self.reads(plan).chain(self.writes()).filter_map(Data::volume)
     }
 

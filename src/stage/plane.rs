@@ -53,12 +53,13 @@
 //! and then up to 1 px from the plane. The + 16 stand for 1 px^2, which holds slopes that little
 //! supports.) The limits are in [`planes`](crate::plan::planes).
 
-use super::{Descriptor, Map, maps};
+use super::{Data, Descriptor, Map, maps};
 use crate::options::Median;
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |_| maps(&[Map::Disparity, Map::Validity]),
+    reads: |_| [maps(&[Map::Disparity, Map::Validity]), vec![Data::LEFT, Data::MedianWeights]].concat(),
     writes: |_| maps(&[Map::Disparity]),
+    needs: |_| vec![Data::NextDisparity],
     taken: |method| method.refinement.median != Median::Off && method.refinement.plane,
     pixel: 90.0,
     ..Descriptor::NONE

@@ -36,7 +36,7 @@
 //!   [`sub_pixel`](super::sub_pixel). With 3 x 3, bad2.0 rises from 7.9 to 8.1 % on KITTI 2015 and from 5.1 to 5.3 on ETH3D.
 //! - The range does not bound the result. That would bend the planes that are laid through it; [`enlarge`](super::enlarge) does.
 
-use super::{Descriptor, Map, maps};
+use super::{Data, Descriptor, Map, maps};
 
 /// How far the disparity may be from twice that of the label, in pixels of the full size.
 pub const REACH: usize = 4;
@@ -67,8 +67,9 @@ pub const OTHERS: [(isize, isize); 16] = [
 pub const NO_CENSUS: u16 = 0xaaaa;
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |_| maps(&[Map::Label]),
+    reads: |_| [maps(&[Map::Label]), vec![Data::FullLeft, Data::FullRight]].concat(),
     writes: |_| maps(&[Map::Raw, Map::Disparity]),
+    needs: |_| vec![Data::FullLeftCensus, Data::FullRightCensus, Data::BlockCosts],
     pixel: 90.0,
     ..Descriptor::NONE
 };

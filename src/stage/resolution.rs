@@ -44,10 +44,13 @@
 //! Messages at labels that the pixel does not have are not defined. Before the first messages, all
 //! count as 0.
 
-use super::{Descriptor, Volume, volumes};
+use super::{Data, Descriptor, Volume, volumes};
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |z| volumes(&[Volume::Belief(z - 1), Volume::Belief(z), Volume::Down(z - 1), Volume::Up(z)]),
+    reads: |z| {
+        let volumes = volumes(&[Volume::Belief(z - 1), Volume::Belief(z), Volume::Down(z - 1), Volume::Up(z)]);
+        [volumes, vec![Data::Windows(z), Data::Windows(z - 1)]].concat()
+    },
     writes: |z| volumes(&[Volume::Down(z - 1), Volume::Up(z)]),
     reach: Some(0),
     joins: true,

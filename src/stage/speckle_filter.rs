@@ -12,11 +12,12 @@
 //! (A tie says that nothing tells the labels apart, as where an image is overexposed. The best
 //! label is then merely the lowest, in regions that may be large.)
 
-use super::{Descriptor, Map, maps};
+use super::{Data, Descriptor, Map, maps};
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Label, Map::Best, Map::RunnerUp, Map::Validity]),
     writes: |_| maps(&[Map::Validity]),
+    needs: |_| vec![Data::Parents, Data::Sizes],
     taken: |method| method.refinement.speckle_size > 0,
     pixel: 15.0,
     ..Descriptor::NONE

@@ -14,11 +14,12 @@
 //! Valid pixels below [`confidence_floor`](crate::options::RefinementOptions::confidence_floor) get
 //! [`LOW_CONFIDENCE`](crate::maps::flag::LOW_CONFIDENCE); they stay valid.
 
-use super::{Descriptor, Map, maps};
+use super::{Data, Descriptor, Map, maps};
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
     writes: |_| maps(&[Map::Confidence, Map::Validity]),
+    needs: |_| vec![Data::NextFlags],
     pixel: 10.0,
     ..Descriptor::NONE
 };

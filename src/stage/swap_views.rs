@@ -13,11 +13,19 @@
 //!
 //! (The runners-up of the right view are not known.)
 
-use super::{Descriptor, Map, maps};
+use super::{Data, Descriptor, Map, maps};
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |_| maps(&[Map::Label, Map::Best, Map::RightLabel, Map::RightBest]),
-    writes: |_| maps(&[Map::Label, Map::Best, Map::RunnerUp, Map::RightLabel, Map::RightBest]),
+    reads: |_| [maps(&[Map::Label, Map::Best, Map::RightLabel, Map::RightBest]), views()].concat(),
+    writes: |_| {
+        let maps = maps(&[Map::Label, Map::Best, Map::RunnerUp, Map::RightLabel, Map::RightBest]);
+        [maps, views()].concat()
+    },
     pixel: 4.0,
     ..Descriptor::NONE
 };
+
+/// Both views, in the sizes that there are.
+fn views() -> Vec<Data> {
+    vec![Data::LEFT, Data::Right, Data::FullLeft, Data::FullRight]
+}

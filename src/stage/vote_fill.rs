@@ -78,8 +78,12 @@ use super::{Data, Descriptor, Map, maps};
 use crate::options::Fill;
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
-    writes: |_| [maps(&[Map::Disparity, Map::Validity, Map::Confidence]), vec![Data::Votes]].concat(),
+    reads: |_| {
+        let maps = maps(&[Map::Label, Map::Disparity, Map::Validity, Map::Confidence]);
+        [maps, vec![Data::LEFT, Data::VoteWeights]].concat()
+    },
+    writes: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
+    needs: |_| vec![Data::Shown, Data::HalfColours, Data::Elected, Data::Sums, Data::Totals],
     taken: |method| method.refinement.fill == Fill::Votes,
     pixel: 60.0,
     ..Descriptor::NONE

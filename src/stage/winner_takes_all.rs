@@ -12,10 +12,10 @@
 //! These are the maps [`Label`](crate::backend::Map::Label), [`Best`](crate::backend::Map::Best)
 //! and [`RunnerUp`](crate::backend::Map::RunnerUp).
 
-use super::{Descriptor, Map, Volume, maps, volumes};
+use super::{Data, Descriptor, Map, Volume, maps};
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |_| volumes(&[Volume::Belief(0)]),
+    reads: |_| vec![Data::Volume(Volume::Belief(0)), Data::Windows(0)],
     writes: |_| maps(&[Map::Label, Map::Best, Map::RunnerUp]),
     reach: Some(0),
     cell: 0.2,

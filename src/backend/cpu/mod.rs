@@ -7,6 +7,7 @@ mod least_squares;
 mod pages;
 mod places;
 mod probe;
+mod stages;
 mod units;
 mod volumes;
 mod windows;
@@ -21,12 +22,10 @@ use crate::maps::Maps;
 use crate::memory;
 use crate::pause::Pause;
 use crate::plan::{Plan, VolumeWidth};
-use crate::program::{Part, Program, Run, Sent, sharing, together};
+use crate::program::{Part, Program, Run, sharing, together};
 use crate::stage::{Data, MapSet};
 use std::future::ready;
-use std::ops::Range;
 use std::time::Duration;
-use units::Units;
 use volumes::Volumes;
 use web_time::Instant;
 
@@ -44,50 +43,6 @@ enum State {
     Narrow(Volumes<u8>),
     Wide(Volumes<u16>),
 }
-
-macro_rules! declare {
-    (
-        levels { $( $level:ident $level_name:ident; )* }
-        level_rows { $( $level_row:ident $level_row_name:ident; )* }
-        finest { $( $finest:ident $finest_name:ident; )* }
-        finest_rows { $( $finest_row:ident $finest_row_name:ident; )* }
-        maps { $( $map:ident $map_name:ident; )* }
-    ) => {
-        $( mod $level_name; )*
-        $( mod $level_row_name; )*
-        $( mod $finest_name; )*
-        $( mod $finest_row_name; )*
-        $( mod $map_name; )*
-
-        impl<U: Units> Volumes<U> {
-            fn run(&mut self, stage: Stage) {
-                self.make_room(stage);
-                match stage {
-                    $( Stage::$level(z) => $level_name::run(self, z), )*
-                    $( Stage::$finest => $finest_name::run(self), )*
-                    $( Stage::$map => $map_name::run(&mut self.maps, &self.plan, &self.pair), )*
-                    by_rows => {
-                        let sent = self.begin(stage);
-                        let height = self.plan.levels[stage.level().unwrap_or(0)].height;
-                        self.run_rows(by_rows, sent, 0..height);
-                    }
-                }
-            }
-
-            /// Runs rows of a stage that goes row by row.
-            fn run_rows(&mut self, stage: Stage, sent: Sent, rows: Range<usize>) {
-                self.make_room(stage);
-                match stage {
-                    $( Stage::$level_row(z) => $level_row_name::rows(self, z, sent, rows), )*
-                    $( Stage::$finest_row => $finest_row_name::rows(self, rows), )*
-                    _ => unreachable!("{stage:?} does not go row by row"),
-                }
-            }
-        }
-    };
-}
-
-crate::for_every_stage!(declare);
 
 /// Runs an expression on the volumes, whatever their width.
 macro_rules! on_volumes {
@@ -146,7 +101,7 @@ impl Backend for Cpu {
     }
 
     fn free(&mut self, data: Data) {
-        if let Data::Graph(z) = data {
+        if let Data::Members(z) = data {
             on_volumes!(self, v => v.levels[z].graph = LevelGraph::default());
         }
     }

@@ -1,192 +1,42 @@
-//! The buffers of a match, allocated once, from the plan alone.
+//! The buffers of a match, allocated once, from the plan and its table of data ([`Data::array`]).
 //!
 //! Where they fit, levels share buffers, so that one dispatch can go over several of them.
 
 use super::allocator::{Allocator, USAGE};
-use super::convergence::Convergence;
-use super::device::Device;
-use super::full_buffers::FullBuffers;
-use super::patch_buffers::PatchBuffers;
-use super::rows::{HALO, Pool, Rows};
+use super::device::{Device, ONE_ROW};
+use super::rows::{Binding, HALO, Pool, Rows};
 use super::uniform::{ALIGN_WORDS, LevelParams};
-use super::vote_buffers::VoteBuffers;
-use super::words::window_words;
 use crate::error::{MemoryError, Result};
-use crate::image::Plane;
-use crate::options::Fill;
-use crate::plan::{LevelPlan, Plan, RING_PART};
-use crate::stage::Stage;
-use crate::weights::MedianWeights;
+use crate::plan::{Plan, RING_PART};
+use crate::stage::{Array, Data, Extent, Map, Place, Start, Volume};
 use std::array;
+use std::collections::HashMap;
 
 /// All buffers of a match on a device.
 pub(super) struct Buffers {
     /// The finest level that shares buffers with all coarser ones; the number of levels where none does.
     pub(super) finest_shared: usize,
-    /// A guide on its way to its level.
-    pub(super) next_guide: wgpu::Buffer,
-    pub(super) levels: Vec<LevelBuffers>,
-    pub(super) left: Rows,
-    pub(super) right: Rows,
-    /// Census of the left and of the right image.
-    pub(super) census: [Rows; 2],
-    /// Weight of colour in the matching cost.
-    pub(super) contrast: Rows,
-    pub(super) median_weights: wgpu::Buffer,
-    pub(super) fill_weights: wgpu::Buffer,
-    /// Label map of the last change, and its squared differences.
-    pub(super) labels: Rows,
-    pub(super) squares: Rows,
-    /// Sums of the squared changes of each row, lower and upper half.
-    pub(super) change_sums: wgpu::Buffer,
-    /// Whether the label map has settled.
-    pub(super) convergence: wgpu::Buffer,
-    /// Workgroups of the dispatches that end when it has: as they are now, and from the start.
+    /// The parameters of each level.
+    pub(super) levels: Vec<LevelParams>,
+    /// Every array by its name and level.
+    arrays: HashMap<(&'static str, usize), (Array, Rows)>,
+    /// Bound in the place of arrays that there are not: a binding of WGSL cannot be absent.
+    nothing: wgpu::Buffer,
+    /// Workgroups of the dispatches that end when the label map has settled: as they are now, and from the start.
     pub(super) groups: wgpu::Buffer,
     pub(super) all_groups: wgpu::Buffer,
     /// Number of these dispatches.
     pub(super) endings: u32,
-    pub(super) optima: Rows,
-    pub(super) right_labels: Rows,
-    pub(super) raw: Rows,
-    pub(super) disparity: Rows,
-    /// Validity and confidence.
-    pub(super) flags: Rows,
-    /// Output of a stage that reads around a pixel, until it replaces the map that was read.
-    pub(super) spare_disparity: Rows,
-    pub(super) spare_flags: Rows,
-    pub(super) speckle_parents: Rows,
-    pub(super) speckle_sizes: Rows,
-    /// Whether each row holds a valid pixel, and the row that it takes its values from.
-    pub(super) filled_rows: wgpu::Buffer,
-    pub(super) source_rows: wgpu::Buffer,
-    /// `None` where the method fills without votes.
-    pub(super) votes: Option<VoteBuffers>,
-    /// `None` where the method does without planes from far away.
-    pub(super) patches: Option<PatchBuffers>,
-    /// `None` where the pair is matched at its full size.
-    pub(super) full: Option<FullBuffers>,
+    /// Arrays that are zero when a match begins.
+    pub(super) zeroed: Vec<Data>,
     written: Vec<wgpu::Buffer>,
     constant: Vec<wgpu::Buffer>,
 }
 
-/// Volumes of one level.
-pub(super) struct LevelBuffers {
-    pub(super) params: LevelParams,
-    pub(super) cost: Rows,
-    pub(super) evidence: Rows,
-    pub(super) dependency: Rows,
-    pub(super) down: Rows,
-    pub(super) up: Rows,
-    pub(super) belief: Rows,
-    /// Label windows, first label | number of labels with padding << 16.
-    pub(super) windows: Rows,
-    /// Those that hold all labels.
-    pub(super) full_windows: wgpu::Buffer,
-    /// Lowest and highest candidate of each pixel, for the windows of the next finer level.
-    pub(super) candidates: Rows,
-    /// First and last label of each pixel; empty where all labels are allowed.
-    pub(super) label_range: Rows,
-    /// What members are chosen by; at level 0 the left image.
-    pub(super) guide: Rows,
-    pub(super) members: Rows,
-    /// Which factors hold each pixel.
-    pub(super) incoming: Rows,
-}
-
-impl LevelBuffers {
-    /// The parameters of the level where what it shares is bound, and where its volumes and its dependency messages begin there,
-    /// in quads.
-    pub(super) fn shared_params(&self, plan: &Plan) -> (LevelParams, (u32, u32)) {
-        let quad = 4 * plan.volume_width.bytes() as u64;
-        let params = LevelParams {
-            members_at: self.members.start(4),
-            incoming_at: self.incoming.start(8),
-            windows_at: self.windows.start(4),
-            ..self.params
-        };
-        (params, (self.belief.start(quad), self.dependency.start(quad)))
-    }
-
-    /// Where its guide begins in what it shares, in pixels.
-    pub(super) fn guide_at(&self) -> u32 {
-        self.guide.start(16)
-    }
-
-    /// The buffers of the volumes that nobody needs any more once there are labels.
-    fn dead_volumes(&self) -> impl Iterator<Item = &wgpu::Buffer> {
-        let rows = [&self.evidence, &self.belief, &self.dependency, &self.down, &self.up];
-        rows.into_iter().flat_map(Rows::buffers)
-    }
-
-    /// The message volumes, which start at 0.
-    pub(super) fn messages(&self) -> [&Rows; 3] {
-        [&self.dependency, &self.down, &self.up]
-    }
-}
-
-/// What levels share, by name and place.
-const SHARED: [&str; 9] = [
-    "evidence",
-    "dependency messages",
-    "messages from above",
-    "messages from below",
-    "belief",
-    "label windows",
-    "guide",
-    "members",
-    "transposed table",
-];
-const EVIDENCE: usize = 0;
-const DEPENDENCY: usize = 1;
-const DOWN: usize = 2;
-const UP: usize = 3;
-const BELIEF: usize = 4;
-const WINDOWS: usize = 5;
-const GUIDE: usize = 6;
-const MEMBERS: usize = 7;
-const INCOMING: usize = 8;
-/// Those with a value for each label.
-const VOLUMES: [usize; 5] = [EVIDENCE, DEPENDENCY, DOWN, UP, BELIEF];
-
-/// The sizes of what a level may share.
-struct Words {
-    /// Words in a row.
-    in_row: [u32; SHARED.len()],
-    rows: [u32; SHARED.len()],
-}
-
-impl Words {
-    fn of(plan: &Plan, z: usize) -> Self {
-        let p = LevelParams::new(plan, &plan.levels[z]);
-        let bytes = plan.volume_width.bytes() as u32;
-        let values = bytes * p.pitch;
-        let windows = full_windows(&plan.levels[z]).len() as u32;
-        let mut rows = [p.height; SHARED.len()];
-        rows[WINDOWS] = 1;
-        let dependency = bytes * p.dependency_pitch;
-        let (guide, incoming) = (4 * p.pixel_pitch, 2 * p.pixel_pitch);
-        let in_row = [p.pitch, dependency, values, values, values, windows, guide, p.member_pitch, incoming];
-        Self { in_row, rows }
-    }
-
-    fn all(&self, kind: usize) -> u64 {
-        u64::from(self.in_row[kind]) * u64::from(self.rows[kind])
-    }
-}
-
-/// Label windows that hold all labels, in as many words as can be bound.
-fn full_windows(level: &LevelPlan) -> Vec<u32> {
-    let (runs, rows) = level.windows();
-    let mut words = window_words(&Plane::filled(runs, rows, [0, level.stride as u16]));
-    words.resize(words.len().next_multiple_of(ALIGN_WORDS), 0);
-    words
-}
-
 /// First rows of the parts of a level, and its height, where the widest rows have so many words. They are even, so that the two
 /// rows of a coarser pixel stay together; none has more than `most`.
-fn part_starts(device: &Device, plan: &Plan, height: u32, widest: u32, most: u32) -> Result<Vec<u32>> {
-    let fitting = device.max_buffer / (4 * u64::from(widest));
+fn part_starts(device: &Device, plan: &Plan, height: u32, widest: usize, most: u32) -> Result<Vec<u32>> {
+    let fitting = device.max_buffer / (4 * widest as u64);
     if fitting.min(u64::from(most)) >= u64::from(height) {
         return Ok(vec![0, height]);
     }
@@ -194,9 +44,47 @@ fn part_starts(device: &Device, plan: &Plan, height: u32, widest: u32, most: u32
     if own == 0 {
         let rows = 2 + 2 * HALO;
         let what = format!("{rows} rows of {} labels", plan.levels[0].labels);
-        return Err(device.too_large(what, 4 * u64::from(rows) * u64::from(widest), device.max_buffer));
+        return Err(device.too_large(what, 4 * u64::from(rows) * widest as u64, device.max_buffer));
     }
     Ok((0..height).step_by(own as usize).chain([height]).collect())
+}
+
+/// How the rows of a level are split into parts.
+struct Parts {
+    whole: [u32; 2],
+    /// The parts of its graph, and of its volumes where all rows of them are held.
+    starts: Vec<u32>,
+    /// Where only some rows are held: the parts of the volumes, which take turns, and how many of them there is room for.
+    in_turns: Option<(Vec<u32>, usize)>,
+}
+
+impl Parts {
+    fn of(device: &Device, plan: &Plan, z: usize) -> Result<Self> {
+        let words = |data: Data| data.array(plan).words;
+        let narrow = words(Data::Incoming(z)).max(words(Data::Members(z)));
+        // A volume of two bytes a label is the widest beside that of all slots.
+        let wide = words(Data::Volume(Volume::Dependency(z))).max(2 * words(Data::Volume(Volume::Evidence(z))));
+        let height = plan.levels[z].height as u32;
+        let streamed = z == 0 && !plan.holds_all_rows();
+        let starts = part_starts(device, plan, height, if streamed { narrow } else { wide }, u32::MAX)?;
+        let in_turns = streamed.then(|| {
+            let starts = part_starts(device, plan, height, wide, RING_PART as u32)?;
+            let count = plan.ring_parts(starts[1] as usize);
+            Ok::<_, crate::error::Error>((starts, count))
+        });
+        Ok(Self { whole: [0, height], starts, in_turns: in_turns.transpose()? })
+    }
+
+    /// Memory of its own for an array of the level.
+    fn rows(&self, a: &mut Allocator, data: Data, array: &Array) -> Result<Rows> {
+        let words = array.words as u32;
+        match (&self.in_turns, data) {
+            (Some((starts, count)), Data::Volume(_)) => a.ring(array.name, words, starts, *count),
+            (_, Data::Guide(_) | Data::NextGuide(_)) => a.rows(array.name, words, &self.whole),
+            _ if array.extent == Extent::Table => a.rows(array.name, words, &[0, 1]),
+            _ => a.rows(array.name, words, &self.starts),
+        }
+    }
 }
 
 impl Buffers {
@@ -211,127 +99,106 @@ impl Buffers {
         }
         let mut allocator = Allocator::new(device);
         let a = &mut allocator;
-        let last = plan.levels.len() - 1;
         let finest_shared = Self::finest_shared(a.device, plan);
-        let mut shared = Self::shared(a, plan, finest_shared)?;
-        let none = [0, 0];
-        let mut levels = Vec::new();
-        for (z, level) in plan.levels.iter().enumerate().rev() {
-            let p = LevelParams::new(plan, level);
-            let words = Words::of(plan, z);
-            let narrow = words.in_row[INCOMING].max(words.in_row[MEMBERS]);
-            let wide = words.in_row[DEPENDENCY].max(2 * p.pitch);
-            let streamed = z == 0 && !plan.holds_all_rows();
-            let starts =
-                part_starts(a.device, plan, p.height, if streamed { narrow } else { wide }, u32::MAX)?;
-            // The parts of the volumes, and how many of them there is room for.
-            let most = if streamed { RING_PART as u32 } else { u32::MAX };
-            let in_turns = part_starts(a.device, plan, p.height, wide, most)?;
-            let count = if streamed { plan.ring_parts(in_turns[1] as usize) } else { usize::MAX };
-            let windows = full_windows(level);
-            let mut rows = |kind: usize, starts: &[u32]| match shared.get_mut(kind) {
-                Some(pool) if z >= finest_shared => Ok(pool.rows(words.in_row[kind], words.rows[kind])),
-                _ if streamed && VOLUMES.contains(&kind) => {
-                    a.ring(SHARED[kind], words.in_row[kind], &in_turns, count)
-                }
-                _ => a.rows(SHARED[kind], words.in_row[kind], starts),
-            };
-            let whole = [0, p.height];
-            let up = if z == 0 { None } else { Some(rows(UP, &starts)?) };
-            levels.push(LevelBuffers {
-                evidence: rows(EVIDENCE, &starts)?,
-                dependency: rows(DEPENDENCY, &starts)?,
-                down: rows(DOWN, if z == last { &none } else { &starts })?,
-                belief: rows(BELIEF, &starts)?,
-                windows: rows(WINDOWS, &[0, 1])?,
-                guide: rows(GUIDE, &whole)?,
-                members: rows(MEMBERS, &starts)?,
-                incoming: rows(INCOMING, &starts)?,
-                // What a level does not have still needs a binding in the shaders.
-                up: up.map_or_else(|| a.rows(SHARED[UP], words.in_row[UP], &none), Ok)?,
-                full_windows: a.constant("full label windows", &windows)?,
-                cost: match z {
-                    0 if streamed => a.ring("cost", p.pitch, &in_turns, count)?,
-                    0 => a.rows("cost", p.pitch, &starts)?,
-                    _ => a.rows("cost", 2 * p.pitch, &starts)?,
-                },
-                candidates: a.rows("candidates", p.pixel_pitch, if z == 0 { &none } else { &starts })?,
-                label_range: a.rows(
-                    "label ranges",
-                    p.pixel_pitch,
-                    if plan.limits_labels() { &starts } else { &none },
-                )?,
-                params: p,
-            });
+        let levels: Vec<_> = plan.levels.iter().map(|level| LevelParams::new(plan, level)).collect();
+        let mut arrays = HashMap::new();
+        let pools = (finest_shared < levels.len()).then(|| Self::pools(a, plan, finest_shared)).transpose()?;
+        let mut pools = pools.unwrap_or_default();
+        // Levels take turns with it.
+        let most = (1..levels.len()).map(|z| Data::NextGuide(z).array(plan).bytes() / 4).max().unwrap_or(0);
+        let next_guide = a.buffer("next guide", most)?;
+        for z in (0..levels.len()).rev() {
+            let parts = Parts::of(a.device, plan, z)?;
+            let there = |data: &Data| data.is_there(plan);
+            for (kind, data) in Data::of_levels(z).into_iter().enumerate().filter(|(_, data)| there(data)) {
+                let array = data.array(plan);
+                let rows = match pools.get_mut(kind) {
+                    Some(pool) if z >= finest_shared => pool.rows(array.words as u32, array.rows as u32),
+                    _ => parts.rows(a, data, &array)?,
+                };
+                arrays.insert((array.name, z), (array, rows));
+            }
+            for data in Data::of_level(z).into_iter().filter(there) {
+                let array = data.array(plan);
+                let rows = match data {
+                    Data::NextGuide(_) => {
+                        Pool::new(next_guide.clone()).rows(array.words as u32, array.rows as u32)
+                    }
+                    Data::FullWindows(_) => {
+                        Rows::of(a.constant("full label windows", &data.constant(plan))?, array.words as u32)
+                    }
+                    _ => parts.rows(a, data, &array)?,
+                };
+                arrays.insert((array.name, z), (array, rows));
+            }
         }
-        levels.reverse();
         if plan.shares {
-            // Levels share buffers, and so do parts that take turns.
-            for buffer in levels.iter().flat_map(LevelBuffers::dead_volumes) {
+            // Post-processing reads no volume but costs. Levels share buffers, and so do parts that take turns.
+            let volumes = (0..levels.len()).flat_map(Data::of_levels).filter(|data| data.volume().is_some());
+            let volumes = volumes.filter_map(|data| arrays.get(&(data.array(plan).name, data.level()?)));
+            for buffer in volumes.flat_map(|(_, rows)| rows.buffers()) {
                 if !a.spare.contains(buffer) {
                     a.spare.push(buffer.clone());
                 }
             }
         }
-        let fine = levels[0].params;
-        let whole = [0, fine.height];
-        let next_guide = levels.get(1).map_or(0, |l| 4 * u64::from(l.params.pixel_pitch * l.params.height));
-        let next_guide = a.buffer("next guide", next_guide)?;
-        let mut map = |label: &str, words: u32| a.rows(label, words * fine.pixel_pitch, &whole);
-        let has_votes = plan.method.refinement.fill == Fill::Votes;
-        let full = plan.full.is_some();
-        let rows = u64::from(fine.height);
+        for data in Data::of_match().into_iter().filter(|data| data.is_there(plan)) {
+            let array = data.array(plan);
+            if data == Data::Groups || arrays.contains_key(&(array.name, 0)) {
+                continue;
+            }
+            let rows = match array.place {
+                Place::In(other) => arrays[&(other.array(plan).name, 0)].1.clone(),
+                _ if array.start == Start::Constant => {
+                    Rows::of(a.constant(array.name, &data.constant(plan))?, array.words as u32)
+                }
+                _ => Self::rows_of_match(a, plan, &array)?,
+            };
+            arrays.insert((array.name, 0), (array, rows));
+        }
+        let zeroed = Data::all(plan).into_iter().filter(|data| data.array(plan).start == Start::Zero);
         Ok(Self {
-            left: levels[0].guide.clone(),
-            right: map("right image", 4)?,
-            census: [map("left census", 2)?, map("right census", 2)?],
-            contrast: map("contrast", 1)?,
-            labels: map("labels", 1)?,
-            squares: map("squares", 1)?,
-            optima: map("optima", 2)?,
-            right_labels: map("right labels", 1)?,
-            raw: map("raw", 1)?,
-            disparity: map("disparity", 1)?,
-            flags: map("flags", 1)?,
-            spare_disparity: map("spare disparity", 1)?,
-            spare_flags: map("spare flags", 1)?,
-            speckle_parents: map("speckle parents", 1)?,
-            speckle_sizes: map("speckle sizes", 1)?,
-            full: full.then(|| FullBuffers::new(a, &fine)).transpose()?,
-            votes: has_votes.then(|| VoteBuffers::new(a, plan, &fine)).transpose()?,
-            patches: (Stage::FarPlane.descriptor().taken)(&plan.method)
-                .then(|| PatchBuffers::new(a, plan, &fine))
-                .transpose()?,
-            median_weights: a.constant("median weights", &MedianWeights::of(&plan.method).words())?,
-            // What distance subtracts is the same for all steps.
-            fill_weights: a
-                .constant("fill weights", &MedianWeights::of_filled(&plan.method, [0; 2]).words())?,
-            change_sums: a.buffer("change", 2 * rows)?,
-            convergence: a.buffer("convergence", size_of::<Convergence>() as u64 / 4)?,
+            finest_shared,
+            levels,
+            arrays,
+            nothing: a.buffer("nothing", 0)?,
             groups: a.buffer("groups", 0)?,
             all_groups: a.constant("groups", &[])?,
             endings: 0,
-            filled_rows: a.buffer("filled rows", rows)?,
-            source_rows: a.buffer("source rows", rows)?,
-            finest_shared,
-            next_guide,
-            levels,
+            zeroed: zeroed.collect(),
             written: allocator.written,
             constant: allocator.constant,
         })
     }
 
+    /// Memory for an array that belongs to no level. Of a band, there are as many rows as the device can bind.
+    fn rows_of_match(a: &mut Allocator, plan: &Plan, array: &Array) -> Result<Rows> {
+        let (words, mut rows) = (array.words as u32, array.rows as u64);
+        if array.of_band && array.place == Place::AnyVolume {
+            let most = a.device.max_binding.min(a.device.max_buffer);
+            rows = rows.min(most / (4 * u64::from(words)));
+            if rows == 0 {
+                return Err(a.device.too_large(ONE_ROW, 4 * u64::from(words), most));
+            }
+        }
+        let height = if array.of_band { rows } else { array.extent.rows(plan) as u64 };
+        Rows::in_parts(words, &[0, height as u32], |_, rows| match array.place {
+            Place::AnyVolume => a.spare_or_new(array.name, u64::from(words) * rows),
+            _ => a.buffer(array.name, u64::from(words) * rows),
+        })
+    }
+
     /// The finest level that shares buffers with all coarser ones: as many as fit in what a shader may see at once.
     pub(super) fn finest_shared(device: &Device, plan: &Plan) -> usize {
-        let most = device.max_binding.min(device.max_buffer) / 4;
+        let most = device.max_binding.min(device.max_buffer);
         // A level of which some rows are held at a time keeps them for itself.
         let first = usize::from(!plan.holds_all_rows());
-        let mut sizes = [0; SHARED.len()];
+        let mut sizes = Data::of_levels(0).map(|_| 0);
         let mut finest = plan.levels.len();
         while finest > first {
-            let words = Words::of(plan, finest - 1);
-            sizes = array::from_fn(|kind| sizes[kind] + words.all(kind));
-            if sizes.iter().any(|&words| words > most) {
+            let here = Data::of_levels(finest - 1);
+            sizes = array::from_fn(|kind| sizes[kind] + here[kind].array(plan).bytes());
+            if sizes.iter().any(|&bytes| bytes > most) {
                 break;
             }
             finest -= 1;
@@ -340,24 +207,63 @@ impl Buffers {
     }
 
     /// The buffers that the levels from `finest` on share.
-    fn shared(a: &mut Allocator, plan: &Plan, finest: usize) -> Result<Vec<Pool>> {
-        let levels = finest..plan.levels.len();
-        let words = |kind: usize| {
-            // Level 0 has no messages from below.
-            let levels = levels.clone().filter(|z| (*z, kind) != (0, UP));
-            levels.map(|z| Words::of(plan, z).all(kind)).sum()
-        };
-        let pools = SHARED.iter().enumerate().filter(|_| !levels.is_empty());
-        pools.map(|(kind, label)| Ok(Pool::new(a.buffer(label, words(kind))?))).collect()
+    fn pools(a: &mut Allocator, plan: &Plan, finest: usize) -> Result<Vec<Pool>> {
+        let kinds = 0..Data::of_levels(0).len();
+        let pools = kinds.map(|kind| {
+            let all = (finest..plan.levels.len()).map(|z| Data::of_levels(z)[kind]);
+            let all: Vec<_> = all.filter(|data| data.is_there(plan)).map(|data| data.array(plan)).collect();
+            let name = all.last().map_or("nothing", |array| array.name);
+            Ok(Pool::new(a.buffer(name, all.iter().map(|array| array.bytes() / 4).sum())?))
+        });
+        pools.collect()
     }
 
-    /// A guide of these parameters on its way to its level.
-    pub(super) fn next_guide(&self, params: &LevelParams) -> Rows {
-        Pool::new(self.next_guide.clone()).rows(4 * params.pixel_pitch, params.height)
+    /// The array of this name at `level`, if there is one. Names are those of bindings: see [`Data::bound`].
+    pub(super) fn named(&self, name: &'static str, level: usize) -> Option<&(Array, Rows)> {
+        self.arrays.get(&Data::place_of(name, level))
+    }
+
+    /// The array of data that there are.
+    pub(super) fn rows(&self, plan: &Plan, data: Data) -> &Rows {
+        &self.arrays[&(data.array(plan).name, data.level().unwrap_or(0))].1
+    }
+
+    /// Volume `volume`, which there is.
+    pub(super) fn volume(&self, plan: &Plan, volume: Volume) -> &Rows {
+        self.rows(plan, Data::Volume(volume))
+    }
+
+    /// The array of `map`, which there is.
+    pub(super) fn map(&self, plan: &Plan, map: Map) -> &Rows {
+        self.rows(plan, Data::Map(map))
+    }
+
+    /// A binding for an array that there is not.
+    pub(super) fn nothing(&self) -> Binding {
+        Binding::whole(&self.nothing)
+    }
+
+    /// The parameters of level `z` where what it shares is bound, and where its volumes and its dependency messages begin there, in quads.
+    pub(super) fn shared_params(&self, plan: &Plan, z: usize) -> (LevelParams, (u32, u32)) {
+        let quad = 4 * plan.volume_width.bytes() as u64;
+        let start = |data: Data, bytes: u64| self.rows(plan, data).start(bytes);
+        let params = LevelParams {
+            members_at: start(Data::Members(z), 4),
+            incoming_at: start(Data::Incoming(z), 8),
+            windows_at: start(Data::Windows(z), 4),
+            ..self.levels[z]
+        };
+        let [belief, dependency] = [Volume::Belief(z), Volume::Dependency(z)].map(Data::Volume);
+        (params, (start(belief, quad), start(dependency, quad)))
     }
 
     /// Makes room for the workgroups of the dispatches that end when the map has settled.
-    pub(super) fn end_when_settled(&mut self, device: &mut Device, groups: &[[u32; 3]]) -> Result<()> {
+    pub(super) fn end_when_settled(
+        &mut self,
+        device: &mut Device,
+        plan: &Plan,
+        groups: &[[u32; 3]],
+    ) -> Result<()> {
         let usage = wgpu::BufferUsages::INDIRECT | USAGE;
         let words = groups.as_flattened();
         let mut allocator = Allocator::new(device);
@@ -366,6 +272,8 @@ impl Buffers {
         self.written.push(self.groups.clone());
         self.constant.append(&mut allocator.constant);
         self.endings = groups.len() as u32;
+        let array = Array { words: words.len().max(ALIGN_WORDS), ..Data::Groups.array(plan) };
+        self.arrays.insert((array.name, 0), (array, Rows::of(self.groups.clone(), array.words as u32)));
         Ok(())
     }
 

@@ -1,13 +1,14 @@
 //! Turns stages into dispatches, in bands of rows where a buffer exceeds the device's largest binding.
 
-use super::buffers::{Buffers, LevelBuffers};
+use super::buffers::Buffers;
 use super::device::{Device, ONE_ROW};
-use super::kernel::{Bindings, Kernel, MAX_LOOP_ITERATIONS};
-use super::rows::{Binding, Copy, Rows};
+use super::kernel::{Bound, Kernel, MAX_LOOP_ITERATIONS};
+use super::rows::{Binding, Copy, Rows, with_halo};
 use super::shader::{Shader, WORKGROUP, binding_number};
-use super::uniform::{self, Band, Header, LevelParams};
+use super::uniform::{self, Band, Header, Layout, LevelParams};
 use crate::error::{DeviceError, Result};
 use crate::plan::{LevelPlan, Plan};
+use crate::stage::{Data, Extent, Volume};
 use bytemuck::bytes_of;
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -59,9 +60,6 @@ struct Section {
     own: Vec<u8>,
 }
 
-/// What is bound for a range of rows.
-type Bind<'a> = dyn Fn(&Range<u32>) -> Vec<Binding> + 'a;
-
 /// Collects the commands of a stage at a level. Only its entry points are generic over kernels, so that the rest is compiled once.
 pub(super) struct Recorder<'a> {
     pub(super) device: &'a mut Device,
@@ -71,66 +69,66 @@ pub(super) struct Recorder<'a> {
     pub(super) level: usize,
     /// The rows of the level to record; `None` for all.
     pub(super) only: Option<Range<u32>>,
+    /// The rows that bindings with `source_` before their name show; those of the dispatch where that is `None`.
+    pub(super) source: Option<Range<u32>>,
     /// Where the workgroups of dispatches go that end when the label map has settled.
     pub(super) endings: Option<&'a mut Vec<[u32; 3]>>,
     pub(super) commands: Vec<Command>,
 }
 
 impl<'a> Recorder<'a> {
-    /// The buffers of the level.
-    pub(super) fn here(&self) -> &'a LevelBuffers {
-        &self.buffers.levels[self.level]
-    }
-
-    /// The buffers of the next finer level.
-    pub(super) fn finer(&self) -> &'a LevelBuffers {
-        &self.buffers.levels[self.level - 1]
-    }
-
-    /// A level of `levels`, whose buffers hold all of them.
-    pub(super) fn shared(&self, levels: &Range<usize>) -> &'a LevelBuffers {
-        &self.buffers.levels[levels.end - 1]
+    /// The array of these data.
+    pub(super) fn array(&self, data: Data) -> &'a Rows {
+        self.buffers.rows(self.plan, data)
     }
 
     /// The parameters of the level, as the shaders get them.
     pub(super) fn params(&self) -> LevelParams {
-        self.here().params
+        self.buffers.levels[self.level]
     }
 
-    /// Dispatches `kernel` for the rows of the level, with `threads` invocations per row and one dispatch per
-    /// band. `bind` gives the buffers for a range of rows.
-    pub(super) fn rows<B: Bindings>(
-        &mut self,
-        kernel: &Kernel<B>,
-        own: &B::Uniform,
-        threads: u32,
-        bind: impl Fn(&Range<u32>) -> B,
-    ) -> Result<()> {
-        self.each_band(&kernel.any(), bytes_of(own), &|height| (threads, height), &|rows| bind(rows).all())
+    /// The level that `kernel` runs at.
+    fn level_of(&self, kernel: &Kernel) -> usize {
+        self.level + usize::from(kernel.coarser)
+    }
+
+    /// The rows that `kernel` runs over.
+    fn extent_of(&self, kernel: &Kernel) -> Extent {
+        kernel.extent.unwrap_or(Extent::Level(self.level_of(kernel)))
+    }
+
+    /// Dispatches `kernel` for the rows of the level, with `threads` invocations per row and one dispatch per band.
+    pub(super) fn rows<U: Layout>(&mut self, kernel: &Kernel<U>, own: &U, threads: u32) -> Result<()> {
+        self.each_band(&kernel.any(), bytes_of(own), &|height| (threads, height))
     }
 
     /// The same with one invocation per row.
-    pub(super) fn one_a_row<B: Bindings>(
-        &mut self,
-        kernel: &Kernel<B>,
-        own: &B::Uniform,
-        bind: impl Fn(&Range<u32>) -> B,
-    ) -> Result<()> {
-        self.each_band(&kernel.any(), bytes_of(own), &|height| (height, 1), &|rows| bind(rows).all())
+    pub(super) fn one_a_row<U: Layout>(&mut self, kernel: &Kernel<U>, own: &U) -> Result<()> {
+        self.each_band(&kernel.any(), bytes_of(own), &|height| (height, 1))
     }
 
-    fn each_band(
-        &mut self,
-        kernel: &Kernel,
-        own: &[u8],
-        size: &dyn Fn(u32) -> (u32, u32),
-        bind: &Bind,
-    ) -> Result<()> {
-        for rows in self.bands(&self.cuts(), bind)? {
-            let (size, bindings) = (size(rows.end - rows.start), bind(&rows));
-            self.band(kernel, own.to_vec(), rows, size, &bindings)?;
+    fn each_band(&mut self, kernel: &Kernel, own: &[u8], size: &dyn Fn(u32) -> (u32, u32)) -> Result<()> {
+        for rows in self.bands(&self.cuts(self.level_of(kernel)), &[(kernel, 0)])? {
+            let size = size(rows.end - rows.start);
+            self.band(kernel, own.to_vec(), rows, size)?;
         }
         Ok(())
+    }
+
+    /// The array that `kernel` binds, and which rows of it where the kernel runs over `rows`; `None` where there is none.
+    fn place(&self, kernel: &Kernel, bound: &Bound, rows: &Range<u32>) -> Option<(&'a Rows, Range<u32>)> {
+        let (array, held) = self.buffers.named(bound.data, self.level_of(kernel))?;
+        let is_source = bound.name.starts_with("source_");
+        let rows = self.source.as_ref().filter(|_| is_source).unwrap_or(rows);
+        let shown = array.extent.rows_of(self.plan, rows, self.extent_of(kernel), bound.around);
+        // A band begins at the first row of its array.
+        Some((held, if array.of_band { 0..shown.end - shown.start } else { shown }))
+    }
+
+    /// What `kernel` binds for a range of rows.
+    fn bindings(&self, kernel: &Kernel, rows: &Range<u32>) -> Vec<Binding> {
+        let binding = |bound| self.place(kernel, bound, rows).map(|(array, rows)| array.bind(&rows));
+        kernel.bound.iter().map(|bound| binding(bound).unwrap_or_else(|| self.buffers.nothing())).collect()
     }
 
     /// Records a copy.
@@ -138,22 +136,29 @@ impl<'a> Recorder<'a> {
         self.commands.extend(copies.into_iter().map(Command::Copy));
     }
 
+    /// Replaces an array by what a stage has put beside it.
+    pub(super) fn replace(&mut self, data: Data, next: Data) {
+        self.copies(self.array(next).copy_to(self.array(data)));
+    }
+
     /// The rows to record.
     fn own_rows(&self) -> Range<u32> {
         self.only.clone().unwrap_or(0..self.params().height)
     }
 
-    /// Updates the halos of `written` around the rows of the level.
-    pub(super) fn renew(&mut self, written: &Rows) {
-        self.copies(written.exchange(&self.own_rows()));
+    /// Updates the halos of `written` around the rows of its level.
+    pub(super) fn renew(&mut self, written: Data) {
+        let all = written.level().filter(|z| *z != self.level).map(|z| 0..self.buffers.levels[z].height);
+        let rows = all.unwrap_or_else(|| self.own_rows());
+        self.copies(self.array(written).exchange(&rows));
     }
 
-    /// Makes the rows of `volume` 0, halos included.
-    pub(super) fn clear(&mut self, volume: &Rows) {
+    /// Makes the rows of `data` 0, halos included.
+    pub(super) fn clear(&mut self, data: Data) {
         let rows = self.own_rows();
-        self.commands
-            .extend(volume.within(&rows).map(|(buffer, bytes)| Command::Clear(buffer.clone(), bytes)));
-        self.renew(volume);
+        let cleared = self.array(data).within(&rows);
+        self.commands.extend(cleared.map(|(buffer, bytes)| Command::Clear(buffer.clone(), bytes)));
+        self.renew(data);
     }
 
     /// Does `record` at another level, for these rows of it.
@@ -170,27 +175,44 @@ impl<'a> Recorder<'a> {
         out
     }
 
-    /// Rows at which a band must end: the first and the last one, and between them the starts of the parts of the level's volumes,
-    /// of its graph and of the volumes of the next finer level.
-    fn cuts(&self) -> Vec<u32> {
-        let (here, rows) = (self.here(), self.own_rows());
-        let mut cuts: BTreeSet<u32> = here.belief.starts().chain(here.members.starts()).collect();
-        if self.level > 0 {
-            cuts.extend(self.finer().belief.starts().map(|row| row / 2));
+    /// Rows of `level` at which a band must end: the first and the last one, and between them the starts of the parts of the level's
+    /// volumes, of its graph and of the volumes of the next finer level.
+    fn cuts(&self, level: usize) -> Vec<u32> {
+        let rows = if level == self.level { self.own_rows() } else { 0..self.buffers.levels[level].height };
+        let starts = |data: Data| self.array(data).starts();
+        let belief = |z: usize| Data::Volume(Volume::Belief(z));
+        let mut cuts: BTreeSet<u32> = starts(belief(level)).chain(starts(Data::Members(level))).collect();
+        if level > 0 {
+            cuts.extend(starts(belief(level - 1)).map(|row| row / 2));
         }
         let between = cuts.into_iter().filter(|row| rows.start < *row && *row < rows.end);
         [rows.start].into_iter().chain(between).chain([rows.end]).collect()
     }
 
-    /// Bands of all rows, as few as possible, such that no binding exceeds the device's largest. For bindings
-    /// that hold no volumes.
-    pub(super) fn map_bands(&self, bind: &Bind) -> Result<Vec<Range<u32>>> {
-        self.bands(&[0, self.params().height], bind)
+    /// Bands of at most `most` rows that no binding of these kernels exceeds the device's largest in, for kernels that bind no volumes.
+    /// Each kernel runs over so many rows more on either side.
+    pub(super) fn bands_of(&self, kernels: &[(&Kernel, u32)], most: usize) -> Result<Vec<Range<u32>>> {
+        let height = self.extent_of(kernels[0].0).rows(self.plan) as u32;
+        let cuts: Vec<_> = (0..height).step_by(most).chain([height]).collect();
+        self.bands(&cuts, kernels)
     }
 
     /// The same between given `cuts`.
-    fn bands(&self, cuts: &[u32], bind: &Bind) -> Result<Vec<Range<u32>>> {
-        let largest = |rows: &Range<u32>| bind(rows).iter().map(Binding::size).max().unwrap_or(0);
+    fn bands(&self, cuts: &[u32], kernels: &[(&Kernel, u32)]) -> Result<Vec<Range<u32>>> {
+        let limit = self.device.max_binding;
+        let size = |kernel: &Kernel, bound: &Bound, rows: &Range<u32>| {
+            let Some((array, rows)) = self.place(kernel, bound, rows) else { return 0 };
+            let bytes = array.row_bytes() * rows.len() as u64;
+            // Of a band, there may be room for fewer rows.
+            if rows.end > array.height() { bytes.max(limit + 1) } else { bytes }
+        };
+        let largest = |rows: &Range<u32>| {
+            let all = kernels.iter().flat_map(|(kernel, more)| {
+                let rows = with_halo(rows, *more, self.extent_of(kernel).rows(self.plan) as u32);
+                kernel.bound.iter().map(move |bound| size(kernel, bound, &rows))
+            });
+            all.max().unwrap_or(0)
+        };
         let mut bands = Vec::new();
         for part in cuts.windows(2).map(|ends| ends[0]..ends[1]) {
             let mut rows = part.end - part.start;
@@ -198,12 +220,12 @@ impl<'a> Recorder<'a> {
                 let starts = part.clone().step_by(rows as usize);
                 let cut: Vec<_> = starts.map(|start| start..(start + rows).min(part.end)).collect();
                 let most = cut.iter().map(largest).max().unwrap_or(0);
-                if most <= self.device.max_binding {
+                if most <= limit {
                     bands.extend(cut);
                     break;
                 }
                 if rows == 1 {
-                    return Err(self.device.too_large(ONE_ROW, most, self.device.max_binding));
+                    return Err(self.device.too_large(ONE_ROW, most, limit));
                 }
                 rows -= rows.div_ceil(8).min(rows - 1);
             }
@@ -212,44 +234,46 @@ impl<'a> Recorder<'a> {
     }
 
     /// Dispatches `kernel` for the band `rows`, with `size.0` invocations in each of `size.1` rows.
-    pub(super) fn dispatch<B: Bindings>(
+    pub(super) fn dispatch<U: Layout>(
         &mut self,
-        kernel: &Kernel<B>,
-        own: &B::Uniform,
+        kernel: &Kernel<U>,
+        own: &U,
         rows: Range<u32>,
         size: (u32, u32),
-        bindings: B,
     ) -> Result<()> {
-        self.band(&kernel.any(), bytes_of(own).to_vec(), rows, size, &bindings.all())
+        self.band(&kernel.any(), bytes_of(own).to_vec(), rows, size)
     }
 
-    fn band(
-        &mut self,
-        kernel: &Kernel,
-        own: Vec<u8>,
-        rows: Range<u32>,
-        size: (u32, u32),
-        bindings: &[Binding],
-    ) -> Result<()> {
-        let section = Section { level: self.params(), rows, size, at: (0, 0), own };
-        self.dispatch_sections(kernel, &[section], bindings)
+    fn band(&mut self, kernel: &Kernel, own: Vec<u8>, rows: Range<u32>, size: (u32, u32)) -> Result<()> {
+        let bindings = self.bindings(kernel, &rows);
+        let level = self.buffers.levels[self.level_of(kernel)];
+        let section = Section { level, rows, size, at: (0, 0), own };
+        self.dispatch_sections(kernel, &[section], &bindings)
     }
 
-    /// Dispatches `kernel` for all rows of `levels` at once, which share their buffers. `own` gives the parameters of a level and its number of invocations in a row.
-    pub(super) fn levels<B: Bindings>(
+    /// Dispatches `kernel` for all rows of `levels` at once, which share their buffers. `own` gives the parameters of a level and its
+    /// number of invocations in a row.
+    pub(super) fn levels<U: Layout>(
         &mut self,
-        kernel: &Kernel<B>,
+        kernel: &Kernel<U>,
         levels: Range<usize>,
-        own: impl Fn(usize) -> (B::Uniform, u32),
-        bindings: B,
+        own: impl Fn(usize) -> (U, u32),
     ) -> Result<()> {
-        let sections = levels.map(|z| {
-            let (here, (own, threads)) = (&self.buffers.levels[z], own(z));
-            let (level, at) = here.shared_params(self.plan);
+        let kernel = kernel.any();
+        let sections = levels.clone().map(|z| {
+            let (own, threads) = own(z);
+            let (level, at) = self.buffers.shared_params(self.plan, z);
             let own = bytes_of(&own).to_vec();
             Section { level, rows: 0..level.height, size: (threads, level.height), at, own }
         });
-        self.dispatch_sections(&kernel.any(), &sections.collect::<Vec<_>>(), &bindings.all())
+        let sections: Vec<_> = sections.collect();
+        // The buffers of any of the levels hold all of them.
+        let bound = kernel.bound.iter().map(|bound| {
+            let named = levels.clone().find_map(|z| self.buffers.named(bound.data, z));
+            named.map_or_else(|| self.buffers.nothing(), |(_, rows)| rows.whole())
+        });
+        let bindings: Vec<_> = bound.collect();
+        self.dispatch_sections(&kernel, &sections, &bindings)
     }
 
     fn dispatch_sections(
@@ -315,7 +339,7 @@ impl<'a> Recorder<'a> {
 
     /// The pipeline of `kernel`, compiled on first use.
     fn pipeline(&mut self, kernel: &Kernel) -> Result<Pipeline> {
-        let Kernel { shader, loops, names, .. } = kernel;
+        let Kernel { shader, loops, bound, .. } = kernel;
         if *loops > MAX_LOOP_ITERATIONS {
             let LevelPlan { width, height, labels, .. } = self.plan.levels[0];
             let (neighbours, shader) = (self.plan.neighbours, shader.stage);
@@ -325,8 +349,8 @@ impl<'a> Recorder<'a> {
             return Ok(pipeline.clone());
         }
         let source = shader.source();
-        let number = |name: &&str| binding_number(&source, name).expect("the shader has what is bound");
-        let numbers = names.iter().map(number).collect();
+        let number = |bound: &Bound| binding_number(&source, bound.name).expect("the shader has what is bound");
+        let numbers = bound.iter().map(number).collect();
         let device = self.device.inner()?;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(shader.stage),

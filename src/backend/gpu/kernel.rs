@@ -1,50 +1,43 @@
-//! Kernels: the entry points of the shaders, each declared once, with what it binds by the names of its shader.
+//! Kernels: the entry points of the shaders, each declared once, with the data that it binds.
 
-use super::rows::Binding;
 use super::shader::{Constant, Shader};
 use super::uniform::{Layout, UniformLayout};
 use crate::plan::{Plan, VolumeWidth};
+use crate::stage::Extent;
 use std::marker::PhantomData;
 
 /// Largest total number of loop iterations of one invocation.
 pub const MAX_LOOP_ITERATIONS: usize = 32_768;
 
 /// Declares the shader of a stage: its own uniform, and a row for each entry point:
-/// `ENTRY: BINDINGS { NAMES } => KERNEL;`. The names are those of the shader. `ENTRY(plan, level)` gives the
-/// kernel, and `kernels(plan, level)` lists all, but for those whose row has a condition that does not hold
-/// (`if ...` before the `=>`).
+/// `ENTRY { NAME, NAME as DATA, NAME around ROWS } => VARIANT;`. The names are those of the shader, and say which data they bind (see
+/// [`Data::bound`](crate::stage::Data::bound)) unless `as` does, with so many rows around those that the kernel runs over. `ENTRY(plan, level)` gives
+/// the kernel, and `kernels(plan, level)` lists all, except those whose condition does not hold (`if ...` before the `=>`).
 macro_rules! shader {
     (
         $stage:literal($plan:ident, $level:ident) { $( $field:ident: $type:ty ),* $(,)? }
         $(
-            $entry:ident: $bindings:ident { $( $name:ident ),+ $(,)? }
-            $( if $condition:expr )? => $kernel:expr;
+            $entry:ident { $( $name:ident $( as $data:ident )? $( around $reach:expr )? ),+ $(,)? }
+            $( if $condition:expr )? => $variant:expr;
         )+
     ) => {
         $crate::backend::gpu::uniform::layout!(Uniform { $( $field: $type ),* });
 
         $(
-            pub(super) struct $bindings {
-                $( $name: $crate::backend::gpu::rows::Binding, )+
-            }
-
-            impl $crate::backend::gpu::kernel::Bindings for $bindings {
-                type Uniform = Uniform;
-                const SHADER: $crate::backend::gpu::Shader = $crate::backend::gpu::Shader::new(
+            #[allow(unused_variables, reason = "not every kernel depends on both")]
+            pub(super) fn $entry(
+                $plan: &$crate::plan::Plan,
+                $level: usize,
+            ) -> $crate::backend::gpu::Kernel<Uniform> {
+                let shader = $crate::backend::gpu::Shader::new(
                     $stage,
                     stringify!($entry),
-                    include_str!(concat!("../../../shaders/", $stage, ".wgsl")),
+                    include_str!(concat!("../../../../shaders/", $stage, ".wgsl")),
                 );
-                const NAMES: &'static [&'static str] = &[$( stringify!($name) ),+];
-
-                fn all(self) -> Vec<$crate::backend::gpu::rows::Binding> {
-                    vec![$( self.$name ),+]
-                }
-            }
-
-            #[allow(unused_variables, reason = "not every kernel depends on both")]
-            fn $entry($plan: &$crate::plan::Plan, $level: usize) -> $crate::backend::gpu::Kernel<$bindings> {
-                $kernel
+                let bound = vec![$( (stringify!($name), 0 $( + ($reach) as u32 )?) ),+];
+                let kernel = $crate::backend::gpu::Kernel::new(shader, bound, $variant);
+                $( $( let kernel = kernel.taking(stringify!($name), stringify!($data)); )? )+
+                kernel
             }
         )+
 
@@ -62,22 +55,54 @@ macro_rules! shader {
 
 pub(super) use shader;
 
-/// What a kernel binds beside its uniform.
-pub(super) trait Bindings {
-    /// The stage's own uniform.
-    type Uniform: Layout;
-    /// The entry point.
-    const SHADER: Shader;
-    /// The names in the shader.
-    const NAMES: &'static [&'static str];
-
-    /// What is bound, in the order of the names.
-    fn all(self) -> Vec<Binding>;
+/// How a plan specialises a kernel.
+#[derive(Clone, Debug)]
+pub(super) struct Variant {
+    loops: usize,
+    width: Option<VolumeWidth>,
+    constants: Vec<(&'static str, Constant)>,
+    sections: usize,
+    extent: Option<Extent>,
+    coarser: bool,
 }
 
-/// A kernel as a plan specialises it, before there is a device; `B` is what it binds, or any.
+impl Variant {
+    /// At most `loops` loop iterations of one invocation, and no constants.
+    pub(super) fn new(loops: usize) -> Self {
+        Self { loops, width: None, constants: Vec::new(), sections: 1, extent: None, coarser: false }
+    }
+
+    /// Messages and beliefs have this width.
+    pub(super) fn of_width(self, width: VolumeWidth) -> Self {
+        Self { width: Some(width), ..self }
+    }
+
+    /// Adds a constant.
+    pub(super) fn with(mut self, name: &'static str, value: impl Into<Constant>) -> Self {
+        self.constants.push((name, value.into()));
+        self
+    }
+
+    /// One dispatch may go over all levels of `plan`.
+    pub(super) fn over_levels(self, plan: &Plan) -> Self {
+        let sections = plan.levels.len();
+        Self { sections, ..self.with("SECTIONS", sections as u32) }
+    }
+
+    /// It runs over rows of this extent, and not over those of its level.
+    pub(super) fn over(self, extent: Extent) -> Self {
+        Self { extent: Some(extent), ..self }
+    }
+
+    /// It runs at the next coarser level than its stage.
+    pub(super) fn at_coarser_level(self) -> Self {
+        Self { coarser: true, ..self }
+    }
+}
+
+/// A kernel as a plan specialises it, before there is a device; `U` is the uniform of its stage, or any.
 #[derive(Clone, Debug)]
-pub struct Kernel<B = ()> {
+pub struct Kernel<U = ()> {
     /// The entry point and its constants.
     pub shader: Shader,
     /// Largest total number of loop iterations of one invocation. Mesa 22 stops a shader silently after about
@@ -86,46 +111,48 @@ pub struct Kernel<B = ()> {
     /// The uniform that it reads: one, or an array of one for each of so many levels.
     pub uniform: UniformLayout,
     /// What it binds beside the uniform.
-    pub names: &'static [&'static str],
+    pub bound: Vec<Bound>,
+    /// Whether it runs at the next coarser level than its stage.
+    pub coarser: bool,
     pub(super) sections: usize,
-    bindings: PhantomData<fn(B)>,
+    pub(super) extent: Option<Extent>,
+    own: PhantomData<fn(U)>,
 }
 
-#[allow(private_bounds, reason = "outside, a kernel binds any")]
-impl<B: Bindings> Kernel<B> {
-    /// The kernel of these bindings, which takes at most `loops` loop iterations.
-    pub(super) fn new(loops: usize) -> Self {
-        Self::of(B::SHADER, loops)
+/// An array that a kernel binds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bound {
+    /// Its name in the shader.
+    pub name: &'static str,
+    /// The name of its data, where the shader has another one.
+    pub data: &'static str,
+    /// Rows that the kernel reads on either side of those that it runs over.
+    pub around: u32,
+}
+
+#[allow(private_bounds, reason = "outside, a kernel has any uniform")]
+impl<U: Layout> Kernel<U> {
+    /// The kernel of an entry point, which binds arrays with so many rows around.
+    pub(super) fn new(mut shader: Shader, bound: Vec<(&'static str, u32)>, variant: Variant) -> Self {
+        let Variant { loops, width, constants, sections, extent, coarser } = variant;
+        (shader.width, shader.constants) = (width, constants);
+        let bound = bound.into_iter().map(|(name, around)| Bound { name, data: name, around }).collect();
+        let uniform = UniformLayout::of::<U>();
+        Self { shader, loops, uniform, bound, coarser, sections, extent, own: PhantomData }
     }
 
-    /// The same in the `shader` of another stage.
-    pub(super) fn of(shader: Shader, loops: usize) -> Self {
-        let uniform = UniformLayout::of::<B::Uniform>();
-        Self { shader, loops, uniform, names: B::NAMES, sections: 1, bindings: PhantomData }
-    }
-
-    /// The same for messages and beliefs of this width.
-    pub(super) fn of_width(mut self, width: VolumeWidth) -> Self {
-        self.shader.width = Some(width);
+    /// Takes the array `name` of the shader from these data.
+    pub(super) fn taking(mut self, name: &str, data: &'static str) -> Self {
+        for bound in self.bound.iter_mut().filter(|bound| bound.name == name) {
+            bound.data = data;
+        }
         self
     }
 
-    /// The same with one more constant.
-    pub(super) fn with(mut self, name: &'static str, value: impl Into<Constant>) -> Self {
-        self.shader.constants.push((name, value.into()));
-        self
-    }
-
-    /// The same for a kernel that may go over as many levels at once as `plan` has.
-    pub(super) fn over_levels(self, plan: &Plan) -> Self {
-        let sections = plan.levels.len();
-        Self { sections, ..self.with("SECTIONS", sections as u32) }
-    }
-
-    /// The same among others.
+    /// Erases the type of the uniform, so that kernels of different stages can be kept in one list.
     pub(super) fn any(&self) -> Kernel {
-        let &Self { ref shader, loops, ref uniform, names, sections, .. } = self;
-        let (shader, uniform) = (shader.clone(), uniform.clone());
-        Kernel { shader, loops, uniform, names, sections, bindings: PhantomData }
+        let &Self { ref shader, loops, ref uniform, ref bound, coarser, sections, extent, .. } = self;
+        let (shader, uniform, bound) = (shader.clone(), uniform.clone(), bound.clone());
+        Kernel { shader, loops, uniform, bound, coarser, sections, extent, own: PhantomData }
     }
 }

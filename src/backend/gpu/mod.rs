@@ -15,19 +15,15 @@ mod commands;
 mod convergence;
 mod device;
 mod fit;
-mod full_buffers;
 mod kernel;
-mod levels;
 mod pace;
-mod patch_buffers;
 mod probe;
 mod queue;
 mod rows;
 mod shader;
+mod stages;
 mod timer;
 mod uniform;
-mod upload;
-mod vote_buffers;
 mod words;
 
 use super::probe::Probe;
@@ -40,71 +36,27 @@ use crate::memory;
 use crate::plan::{LevelPlan, Plan};
 use crate::program::schedule::split;
 use crate::program::{Program, Run, joined, sharing, together};
+use crate::stage::Data;
 pub use adapters::{DeviceInfo, has_automatic_async, may_have_gpu};
 #[cfg(not(target_arch = "wasm32"))]
 pub use adapters::{devices, has_automatic};
-use buffers::{Buffers, LevelBuffers};
+use buffers::Buffers;
 use commands::{Command, Pipelines, Recorder};
 use convergence::Convergence;
 use device::Device;
 pub use device::FaultInjection;
-pub use kernel::{Kernel, MAX_LOOP_ITERATIONS};
-use levels::record_levels;
-use rows::Rows;
+pub use kernel::{Bound, Kernel, MAX_LOOP_ITERATIONS};
 pub use shader::{Constant, Shader, binding_number};
+use stages::{record, record_levels, record_upload};
+pub use stages::{kernels, other_kernels};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 use timer::Timer;
 pub use uniform::UniformLayout;
+use uniform::full_pitch;
 use words::{full_words, image_words, label_range_words, narrow_words};
-
-macro_rules! declare {
-    (
-        levels { $( $level:ident $level_name:ident; )* }
-        level_rows { $( $level_row:ident $level_row_name:ident; )* }
-        finest { $( $finest:ident $finest_name:ident; )* }
-        finest_rows { $( $finest_row:ident $finest_row_name:ident; )* }
-        maps { $( $map:ident $map_name:ident; )* }
-    ) => {
-        $( mod $level_name; )*
-        $( mod $level_row_name; )*
-        $( mod $finest_name; )*
-        $( mod $finest_row_name; )*
-        $( mod $map_name; )*
-
-        /// What `stage` runs of its shader, for `plan`, without a device.
-        #[must_use]
-        pub fn kernels(stage: Stage, plan: &Plan) -> Vec<Kernel> {
-            match stage {
-                $( Stage::$level(z) => $level_name::kernels(plan, z), )*
-                $( Stage::$level_row(z) => $level_row_name::kernels(plan, z), )*
-                $( Stage::$finest => $finest_name::kernels(plan, 0), )*
-                $( Stage::$finest_row => $finest_row_name::kernels(plan, 0), )*
-                $( Stage::$map => $map_name::kernels(plan, 0), )*
-            }
-        }
-
-        fn record(recorder: &mut Recorder, stage: Stage) -> Result<()> {
-            match stage {
-                $( Stage::$level(_) => $level_name::record(recorder), )*
-                $( Stage::$level_row(_) => $level_row_name::record(recorder), )*
-                $( Stage::$finest => $finest_name::record(recorder), )*
-                $( Stage::$finest_row => $finest_row_name::record(recorder), )*
-                $( Stage::$map => $map_name::record(recorder), )*
-            }
-        }
-    };
-}
-
-crate::for_every_stage!(declare);
-
-/// What a match by `plan` may run, beside the [`kernels`] of its stages.
-#[must_use]
-pub fn other_kernels(plan: &Plan) -> Vec<Kernel> {
-    upload::kernels(plan, 0)
-}
 
 /// The GPU path on one device.
 pub struct Gpu {
@@ -189,7 +141,7 @@ impl Gpu {
             }
         }
         // This stage makes the dispatches of messages empty: it comes when these are known.
-        buffers.end_when_settled(&mut self.device, &endings)?;
+        buffers.end_when_settled(&mut self.device, plan, &endings)?;
         Ok(commands)
     }
 
@@ -222,7 +174,7 @@ impl Gpu {
     ) -> Result<Arc<[Command]>> {
         let Self { device, pipelines, .. } = self;
         let mut recorder =
-            Recorder { device, pipelines, plan, buffers, level, only: None, endings, commands: Vec::new() };
+            Recorder { device, pipelines, plan, buffers, level, only: None, source: None, endings, commands: Vec::new() };
         record(&mut recorder)?;
         Ok(recorder.commands.into())
     }
@@ -238,8 +190,8 @@ impl Gpu {
         }
         let mut buffers = Buffers::new(&mut self.device, plan)?;
         let commands = self.all_commands(plan, &mut buffers)?;
-        let upload = self.recorded_at(0, plan, &buffers, None, |recorder| upload::record(recorder))?;
-        let words = buffers.levels[0].params.pixel_pitch as usize * plan.size().1;
+        let upload = self.recorded_at(0, plan, &buffers, None, |recorder| record_upload(recorder))?;
+        let words = buffers.levels[0].pixel_pitch as usize * plan.size().1;
         Ok(State { plan: plan.clone(), buffers, commands, upload, words: vec![0; words] })
     }
 
@@ -247,44 +199,42 @@ impl Gpu {
     fn load(&mut self, state: &mut State, prepared: &Prepared) -> Result<()> {
         let State { plan, buffers, words, upload, .. } = state;
         let device = &mut self.device;
-        let (pair, pitch) = (&prepared.pair, buffers.levels[0].params.pixel_pitch);
+        let (pair, pitch) = (&prepared.pair, buffers.levels[0].pixel_pitch);
+        let array = |data: Data| buffers.rows(plan, data);
         let mut narrow = true;
-        for (image, spare) in [(pair.left(), &buffers.spare_disparity), (pair.right(), &buffers.spare_flags)]
-        {
+        for (image, on_its_way) in [(pair.left(), Data::LeftWords), (pair.right(), Data::RightWords)] {
             narrow = narrow && narrow_words(image, pitch, words);
             if narrow {
-                spare.write(device, words)?;
+                array(on_its_way).write(device, words)?;
             }
         }
         if !narrow {
-            buffers.left.write(device, &image_words(pair.left(), pitch))?;
-            buffers.right.write(device, &image_words(pair.right(), pitch))?;
+            array(Data::LEFT).write(device, &image_words(pair.left(), pitch))?;
+            array(Data::Right).write(device, &image_words(pair.right(), pitch))?;
         }
-        if let (Some(full), Some(larger)) = (&buffers.full, pair.full()) {
-            full.left.write(device, &full_words(larger.left(), full.pitch))?;
-            full.right.write(device, &full_words(larger.right(), full.pitch))?;
+        if let Some(larger) = pair.full().filter(|_| plan.full.is_some()) {
+            array(Data::FullLeft).write(device, &full_words(larger.left(), full_pitch(plan)))?;
+            array(Data::FullRight).write(device, &full_words(larger.right(), full_pitch(plan)))?;
         }
-        for (z, (level, l)) in buffers.levels.iter().zip(&plan.levels).enumerate() {
-            if plan.limits_labels() {
-                let words = |ranges: &Plane<_>| label_range_words(ranges, &level.params);
-                let all = || words(&Plane::filled(l.width, l.height, [0, l.labels as u16 - 1]));
-                level.label_range.write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
-            }
+        for (z, l) in plan.levels.iter().enumerate().filter(|_| plan.limits_labels()) {
+            let words = |ranges: &Plane<_>| label_range_words(ranges, &buffers.levels[z]);
+            let all = || words(&Plane::filled(l.width, l.height, [0, l.labels as u16 - 1]));
+            array(Data::LabelRange(z)).write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
         }
         // Where not all rows are held, those of a part become 0 when it is entered.
-        let held = buffers.levels.iter().skip(usize::from(!plan.holds_all_rows()));
-        let zeroed = held.flat_map(LevelBuffers::messages).chain([&buffers.labels]);
+        let by_parts = |data: &Data| !plan.holds_all_rows() && data.level() == Some(0);
         let encoder = self.encoder()?;
-        for (buffer, place) in zeroed.flat_map(Rows::held) {
-            encoder.clear_buffer(buffer, place.start, Some(place.end - place.start));
-        }
-        for level in &buffers.levels {
-            for (windows, place) in level.windows.held() {
-                let size = place.end - place.start;
-                encoder.copy_buffer_to_buffer(&level.full_windows, 0, windows, place.start, size);
+        for data in buffers.zeroed.iter().filter(|data| !by_parts(data)) {
+            for (buffer, place) in array(*data).held() {
+                encoder.clear_buffer(buffer, place.start, Some(place.end - place.start));
             }
         }
-        encoder.clear_buffer(&buffers.convergence, 0, None);
+        for z in 0..plan.levels.len() {
+            for copy in array(Data::FullWindows(z)).copy_to(array(Data::Windows(z))) {
+                let ((from, at), (to, to_at)) = (&copy.from, &copy.to);
+                encoder.copy_buffer_to_buffer(from, *at, to, *to_at, copy.bytes);
+            }
+        }
         let size = buffers.all_groups.size();
         encoder.copy_buffer_to_buffer(&buffers.all_groups, 0, &buffers.groups, 0, size);
         if narrow {
@@ -297,7 +247,8 @@ impl Gpu {
     }
 
     fn convergence_at(&self) -> (wgpu::Buffer, Range<u64>) {
-        (self.state().buffers.convergence.clone(), 0..size_of::<Convergence>() as u64)
+        let State { plan, buffers, .. } = self.state();
+        buffers.rows(plan, Data::Convergence).own().remove(0)
     }
 
     /// What [`Stage::Change`] has found so far.
@@ -309,11 +260,10 @@ impl Gpu {
 
     /// Width, height, and elements in a row of a map.
     fn map_shape(&self, map: Map) -> (usize, usize, usize) {
-        let State { plan, buffers, .. } = self.state();
+        let plan = &self.state().plan;
         let (width, height) = map.size(plan);
-        let full = buffers.full.as_ref().filter(|_| Map::FULL.contains(&map));
-        let pitch = full.map_or(buffers.levels[0].params.pixel_pitch, |full| full.pitch);
-        (width, height, pitch as usize)
+        let array = Data::Map(map).array(plan);
+        (width, height, array.words / map.words())
     }
 }
 
@@ -443,11 +393,12 @@ impl Backend for Gpu {
     }
 
     fn request_maps(&mut self) -> Result<Ticket> {
-        let b = &self.state().buffers;
-        let (full, here) = (b.full.as_ref(), [&b.disparity, &b.raw, &b.flags]);
-        let shape = self.map_shape(full.map_or(Map::Disparity, |_| Map::FullDisparity));
-        let maps = full.map_or(here, |full| [&full.disparity, &full.raw, &full.flags]);
-        let mut parts: Vec<_> = maps.into_iter().flat_map(Rows::own).collect();
+        let State { plan, buffers, .. } = self.state();
+        let here = [Map::Disparity, Map::Raw, Map::Validity];
+        let full = [Map::FullDisparity, Map::FullRaw, Map::FullValidity];
+        let maps = if plan.full.is_some() { full } else { here };
+        let shape = self.map_shape(maps[0]);
+        let mut parts: Vec<_> = maps.into_iter().flat_map(|map| buffers.map(plan, map).own()).collect();
         parts.extend(self.state().plan.settled_change().map(|_| self.convergence_at()));
         let parts = self.request(&parts)?;
         Ok(self.requests.add(RequestedMaps { parts, shape }))

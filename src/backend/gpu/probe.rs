@@ -1,7 +1,7 @@
 //! Reads and writes volumes and maps on a device, and measures its copy rate.
 
-use super::Gpu;
-use super::graph;
+use super::stages::record_transposed;
+use super::{Gpu, State};
 use super::rows::Rows;
 use super::words::window_words;
 use crate::backend::probe::Probe;
@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::graph::{LevelGraph, NO_MEMBER};
 use crate::image::Plane;
 use crate::plan::Plan;
-use crate::stage::{PaddedRows, Volume, volume_shape};
+use crate::stage::{Data, PaddedRows, Volume, volume_shape};
 use pollster::block_on;
 use std::time::Duration;
 use web_time::Instant;
@@ -59,7 +59,7 @@ impl Probe for Gpu {
 
     fn windows(&mut self, level: usize) -> Result<Plane<[u16; 2]>> {
         let (runs, rows) = self.state().plan.levels[level].windows();
-        let windows = self.state().buffers.levels[level].windows.clone();
+        let windows = self.state().buffers.rows(&self.state().plan, Data::Windows(level)).clone();
         let words = block_on(self.words(&windows))?;
         let windows = words[..runs * rows].iter().map(|&word| [word as u16, (word >> 16) as u16]).collect();
         Ok(Plane::new(runs, rows, windows))
@@ -67,7 +67,7 @@ impl Probe for Gpu {
 
     fn set_windows(&mut self, level: usize, windows: &Plane<[u16; 2]>) -> Result<()> {
         self.submit()?;
-        let [(buffer, place)] = &self.state().buffers.levels[level].windows.own()[..] else {
+        let [(buffer, place)] = &self.state().buffers.rows(&self.state().plan, Data::Windows(level)).own()[..] else {
             unreachable!("one row is in one part")
         };
         self.device.write_at(buffer, place.start, bytemuck::cast_slice(&window_words(windows)))
@@ -78,8 +78,9 @@ impl Probe for Gpu {
     }
 
     fn graph(&mut self, level: usize) -> Result<LevelGraph> {
-        let here = &self.state().buffers.levels[level];
-        let (members, pitch) = (here.members.clone(), here.params.member_pitch as usize);
+        let State { plan, buffers, .. } = self.state();
+        let members = buffers.rows(plan, Data::Members(level)).clone();
+        let pitch = buffers.levels[level].member_pitch as usize;
         let words = block_on(self.words(&members))?;
         let plan = &self.state().plan;
         let (neighbours, l) = (plan.neighbours, &plan.levels[level]);
@@ -95,8 +96,8 @@ impl Probe for Gpu {
     fn set_graph(&mut self, level: usize, graph: &LevelGraph) -> Result<()> {
         self.submit()?;
         let state = self.state.take().expect("prepare comes before every stage");
-        let (here, neighbours) = (&state.buffers.levels[level], state.plan.neighbours);
-        let pitch = here.params.member_pitch as usize;
+        let neighbours = state.plan.neighbours;
+        let pitch = state.buffers.levels[level].member_pitch as usize;
         let mut words = vec![u32::MAX; pitch * graph.height()];
         for (factor, codes) in graph.codes().chunks_exact(neighbours.max(1)).enumerate() {
             let (x, y) = (factor % graph.width(), factor / graph.width());
@@ -105,9 +106,9 @@ impl Probe for Gpu {
                 *word ^= u32::from(code ^ NO_MEMBER) << (8 * (i % 4));
             }
         }
-        here.members.write(&mut self.device, &words)?;
+        state.buffers.rows(&state.plan, Data::Members(level)).write(&mut self.device, &words)?;
         let commands = self.recorded_at(level, &state.plan, &state.buffers, None, |recorder| {
-            graph::record_transposed(recorder)
+            record_transposed(recorder)
         })?;
         self.state = Some(state);
         self.record(&commands)
@@ -178,44 +179,24 @@ impl Gpu {
 
     /// The location of a volume: its rows, words per row and values per word.
     fn volume(&self, volume: Volume) -> (Rows, usize, usize) {
-        let state = self.state();
-        let width = state.plan.volume_width.bytes();
-        let level = &state.buffers.levels[volume.level()];
-        let (rows, bytes) = match volume {
-            Volume::Cost(z) => (&level.cost, if z == 0 { 1 } else { 2 }),
-            Volume::Evidence(_) => (&level.evidence, 1),
-            Volume::Dependency(_) => (&level.dependency, width),
-            Volume::Down(_) => (&level.down, width),
-            Volume::Up(_) => (&level.up, width),
-            Volume::Belief(_) => (&level.belief, width),
-        };
-        let pitch = match volume {
-            Volume::Dependency(_) => level.params.dependency_pitch,
-            _ => level.params.pitch,
-        };
-        (rows.clone(), bytes * pitch as usize, 4 / bytes)
+        let State { plan, buffers, .. } = self.state();
+        let array = Data::Volume(volume).array(plan);
+        let bytes = volume.bytes(plan);
+        (buffers.volume(plan, volume).clone(), array.words, 4 / bytes)
     }
 
     /// The location of a map: its rows, words per pixel, the word, the lowest bit and the mask.
     fn place_of(&self, map: Map) -> (Rows, usize, usize, u32, u32) {
-        let b = &self.state().buffers;
-        let full = || b.full.as_ref().expect("maps at full size");
-        let (rows, words, word, bit, mask) = match map {
-            Map::Label => (&b.optima, 2, 0, 0, 0xffff),
-            Map::Best => (&b.optima, 2, 0, 16, 0xffff),
-            Map::RunnerUp => (&b.optima, 2, 1, 0, 0xffff),
-            Map::RightLabel => (&b.right_labels, 1, 0, 0, 0xffff),
-            Map::RightBest => (&b.right_labels, 1, 0, 16, 0xffff),
-            Map::Raw => (&b.raw, 1, 0, 0, u32::MAX),
-            Map::Disparity => (&b.disparity, 1, 0, 0, u32::MAX),
-            Map::Validity => (&b.flags, 1, 0, 0, 0xff),
-            Map::Confidence => (&b.flags, 1, 0, 8, 0xff),
-            Map::FullRaw => (&full().raw, 1, 0, 0, u32::MAX),
-            Map::FullDisparity => (&full().disparity, 1, 0, 0, u32::MAX),
-            Map::FullValidity => (&full().flags, 1, 0, 0, 0xff),
-            Map::FullConfidence => (&full().flags, 1, 0, 8, 0xff),
+        let State { plan, buffers, .. } = self.state();
+        let (word, bit, mask) = match map {
+            Map::Label | Map::RightLabel => (0, 0, 0xffff),
+            Map::Best | Map::RightBest => (0, 16, 0xffff),
+            Map::RunnerUp => (1, 0, 0xffff),
+            Map::Raw | Map::Disparity | Map::FullRaw | Map::FullDisparity => (0, 0, u32::MAX),
+            Map::Validity | Map::FullValidity => (0, 0, 0xff),
+            Map::Confidence | Map::FullConfidence => (0, 8, 0xff),
         };
-        (rows.clone(), words, word, bit, mask)
+        (buffers.map(plan, map).clone(), map.words(), word, bit, mask)
     }
 }
 

@@ -102,6 +102,12 @@ impl Rows {
         Ok(Self { parts: parts.collect::<Result<_>>()?, row_bytes: 4 * u64::from(words) })
     }
 
+    /// One row of so many words, in a buffer of its own.
+    pub(super) fn of(buffer: wgpu::Buffer, words: u32) -> Self {
+        let part = Part { buffer, own: 0..1, held: 0..1, offset: 0 };
+        Self { parts: vec![part], row_bytes: 4 * u64::from(words) }
+    }
+
     /// Binds `rows`, which one part owns, with as much of their halo as that part holds: for a stage that
     /// writes the rows, or reads around them.
     pub(super) fn bind(&self, rows: &Range<u32>) -> Binding {
@@ -147,6 +153,16 @@ impl Rows {
                 bytes: from.held.len() as u64 * self.row_bytes,
             })
             .collect()
+    }
+
+    /// Bytes of a row.
+    pub(super) fn row_bytes(&self) -> u64 {
+        self.row_bytes
+    }
+
+    /// Number of rows.
+    pub(super) fn height(&self) -> u32 {
+        self.parts.last().map_or(0, |part| part.own.end)
     }
 
     /// First row of each part.

@@ -71,6 +71,11 @@ impl LevelParams {
     }
 }
 
+/// Elements in a row of a map at full size.
+pub(super) fn full_pitch(plan: &Plan) -> u32 {
+    (2 * plan.levels[0].width).next_multiple_of(ALIGN_WORDS) as u32
+}
+
 layout! {
     /// `Band` of `shaders/shared/band.wgsl`.
     Band {

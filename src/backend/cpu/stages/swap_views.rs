@@ -1,0 +1,9 @@
+//! The right view in place of the left one: see [`crate::backend::Stage::SwapViews`].
+
+use crate::backend::cpu::units::Units;
+use crate::backend::cpu::volumes::Volumes;
+
+pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
+    v.pair = v.pair.mirrored();
+    v.maps.swap_views();
+}

@@ -1,9 +1,0 @@
-//! The right view in place of the left one: see [`crate::backend::Stage::SwapViews`].
-
-use super::units::Units;
-use super::volumes::Volumes;
-
-pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
-    v.pair = v.pair.mirrored();
-    v.maps.swap_views();
-}

@@ -1,0 +1,53 @@
+//! Messages of the dependency factors: see [`Stage::Dependency`](crate::backend::Stage::Dependency).
+//!
+//! Floor, a label and three members: 7 bytes moved, 15 asked for (the beliefs of three members, all of it again after the
+//! minimum), 50 operations for four labels.
+
+use crate::backend::gpu::commands::Recorder;
+use crate::backend::gpu::kernel::{Variant, shader};
+use crate::backend::gpu::rows::HALO;
+use crate::error::Result;
+use crate::graph::NO_MEMBER;
+use crate::plan::{GRAPH_WINDOW, Plan, TruncationRule};
+use crate::stage::{Data, Volume};
+use std::ops::Range;
+
+shader! {
+    "dependency"(plan, level) { tau: u32, step: u32 }
+    main { members, belief around HALO, dependency, windows } => {
+        let absolute = plan.dependency.rule == TruncationRule::Absolute;
+        // The finest level has the most labels.
+        let (quads, slots) = (plan.levels[0].quads(), plan.slots());
+        let floors = if absolute { slots * (quads + 1) } else { 0 };
+        Variant::new(floors + 3 * slots + 2 * quads * (2 * slots + 1))
+            .of_width(plan.volume_width)
+            .with("SLOTS", slots as u32)
+            .with("ABSOLUTE", absolute)
+            .with("STEPS", plan.label_step(level).is_some())
+            .with("NO_MEMBER", u32::from(NO_MEMBER))
+            .with("WINDOW", GRAPH_WINDOW as u32)
+            .with("RADIUS", HALO)
+            .over_levels(plan)
+    };
+}
+
+/// The uniform of `level`. A step that costs as much as any disagreement is none.
+fn uniform(plan: &Plan, level: usize) -> Uniform {
+    let tau = plan.dependency.tau;
+    Uniform { tau: tau.into(), step: plan.label_step(level).unwrap_or(tau).into() }
+}
+
+pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    let (plan, z, width) = (r.plan, r.level, r.params().width);
+    r.rows(&main(plan, z), &uniform(plan, z), width)?;
+    r.renew(Data::Volume(Volume::Dependency(z)));
+    Ok(())
+}
+
+/// The same for all of `levels` at once.
+pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
+    let (plan, buffers) = (r.plan, r.buffers);
+    let own = |z: usize| (uniform(plan, z), buffers.levels[z].width);
+    // The coarsest has steps wherever another one has.
+    r.levels(&main(plan, levels.end - 1), levels, own)
+}

@@ -1,0 +1,75 @@
+//! The stages on a device: of each, the file of its name.
+
+mod upload;
+
+use super::commands::Recorder;
+use super::kernel::Kernel;
+use crate::error::Result;
+use crate::plan::Plan;
+use crate::stage::Stage;
+pub(super) use graph::record_transposed;
+use std::ops::Range;
+pub(super) use upload::record as record_upload;
+
+macro_rules! declare {
+    (
+        levels { $( $level:ident $level_name:ident; )* }
+        level_rows { $( $level_row:ident $level_row_name:ident; )* }
+        finest { $( $finest:ident $finest_name:ident; )* }
+        finest_rows { $( $finest_row:ident $finest_row_name:ident; )* }
+        maps { $( $map:ident $map_name:ident; )* }
+    ) => {
+        $( mod $level_name; )*
+        $( mod $level_row_name; )*
+        $( mod $finest_name; )*
+        $( mod $finest_row_name; )*
+        $( mod $map_name; )*
+
+        /// What `stage` runs of its shader, for `plan`, without a device.
+        #[must_use]
+        pub fn kernels(stage: Stage, plan: &Plan) -> Vec<Kernel> {
+            match stage {
+                $( Stage::$level(z) => $level_name::kernels(plan, z), )*
+                $( Stage::$level_row(z) => $level_row_name::kernels(plan, z), )*
+                $( Stage::$finest => $finest_name::kernels(plan, 0), )*
+                $( Stage::$finest_row => $finest_row_name::kernels(plan, 0), )*
+                $( Stage::$map => $map_name::kernels(plan, 0), )*
+            }
+        }
+
+        pub(super) fn record(recorder: &mut Recorder, stage: Stage) -> Result<()> {
+            match stage {
+                $( Stage::$level(_) => $level_name::record(recorder), )*
+                $( Stage::$level_row(_) => $level_row_name::record(recorder), )*
+                $( Stage::$finest => $finest_name::record(recorder), )*
+                $( Stage::$finest_row => $finest_row_name::record(recorder), )*
+                $( Stage::$map => $map_name::record(recorder), )*
+            }
+        }
+    };
+}
+
+crate::for_every_stage!(declare);
+
+/// What a match by `plan` may run, beside the [`kernels`] of its stages.
+#[must_use]
+pub fn other_kernels(plan: &Plan) -> Vec<Kernel> {
+    upload::kernels(plan, 0)
+}
+
+
+/// Records a stage at several levels at once.
+pub(super) type RecordLevels = fn(&mut Recorder, Range<usize>) -> Result<()>;
+
+/// The stages that can go over several levels in one dispatch, by name.
+const OVER_LEVELS: [(&str, RecordLevels); 4] = [
+    ("graph", graph::record_levels),
+    ("dependency", dependency::record_levels),
+    ("resolution", resolution::record_levels),
+    ("belief", belief::record_levels),
+];
+
+/// How `stage` goes over levels at once, where it can.
+pub(super) fn record_levels(stage: Stage) -> Option<RecordLevels> {
+    OVER_LEVELS.into_iter().find(|(name, _)| *name == stage.name()).map(|(_, record)| record)
+}

@@ -1,0 +1,19 @@
+//! The map of the right view: see [`Stage::RightView`](crate::backend::Stage::RightView).
+//!
+//! Floor, a label: 1 byte moved, 4 asked for (words of four labels of which it wants one), 20 operations for four.
+
+use crate::backend::gpu::commands::Recorder;
+use crate::backend::gpu::kernel::{Variant, shader};
+use crate::error::Result;
+
+shader! {
+    "right_view"(plan, level) { first_column: u32, columns: u32 }
+    main { belief, right_labels } => Variant::new(plan.levels[0].labels).of_width(plan.volume_width);
+}
+
+/// The tile decides which columns count, so each tile has its own steps.
+pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    let (core, width) = (&r.plan.core, r.params().width);
+    let own = Uniform { first_column: core.start as u32, columns: core.len() as u32 };
+    r.rows(&main(r.plan, 0), &own, width)
+}
