@@ -3,7 +3,7 @@
 use super::units::{Units, argmin};
 use super::volumes::{Level, Volumes};
 use super::windows::Window;
-use rayon::prelude::*;
+use crate::threads::loops::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
     let (width, Level { belief, windows, .. }) = (v.plan.levels[0].width, &v.levels[0]);

@@ -6,7 +6,7 @@ use super::volumes::Volumes;
 use super::windows::{Window, Windows};
 use crate::plan::LevelPlan;
 use crate::program::Sent;
-use rayon::prelude::*;
+use crate::threads::loops::*;
 use std::ops::Range;
 
 /// The evidence of these rows.
