@@ -13,7 +13,7 @@ use super::filter::{moved, smoothed};
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
 use crate::options::{DisparityRange, FrontOptions};
-use crate::threads::loops::join;
+use crate::threads::prelude::join;
 use std::fmt;
 
 /// What is corrected in a pair.

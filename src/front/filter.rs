@@ -10,7 +10,7 @@ use super::illumination::gaussian;
 use crate::image::cubic::{BITS, WEIGHTS};
 use crate::image::{Image, Pixel, Plane, grey};
 use crate::maps::FRACTION;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 /// What filters work on: numbers of 16 bits, one or more a pixel.
 pub(super) trait Pixels: Pod + Send + Sync {}

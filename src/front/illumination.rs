@@ -5,7 +5,7 @@
 //! by it leaves reflectance. The paper gives only the size of the filter, 21 x 21; the rest is decided here.
 
 use crate::image::{Image, Pixel, Plane, grey};
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 /// Radius of the filter in pixels: 21 x 21 in all, as in the paper.
 const RADIUS: usize = 10;

@@ -19,7 +19,7 @@ use crate::maps::FRACTION;
 use crate::memory;
 use crate::options::DisparityRange;
 use crate::threads;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use corners::{SPACING, cell, corners};
 use correlation::correlation;
 use std::collections::BTreeMap;

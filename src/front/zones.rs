@@ -16,7 +16,7 @@ pub mod regions;
 
 use crate::image::{Image, Plane};
 use crate::options::ZoneExtent;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use gabor::{ORIENTATIONS, Response};
 pub use kmeans::Options;
 pub use regions::{MASKED, Zones};

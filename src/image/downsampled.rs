@@ -2,7 +2,7 @@
 
 use super::{Image, Pixel, Plane};
 use crate::threads;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use bytemuck::cast_slice;
 
 /// The weights of the low-pass, in both directions.

@@ -5,7 +5,7 @@ use crate::image::cubic::{BITS, STEPS, WEIGHTS};
 use crate::image::{Image, Pixel, Plane, grey};
 use crate::memory;
 use crate::threads;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 /// A place in an image: x and y, in 1/[`STEPS`] px.
 pub(super) type Place = [i32; 2];

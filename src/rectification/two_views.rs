@@ -16,7 +16,7 @@ use crate::calibration::matrix::{
 };
 use crate::error::Result;
 use crate::threads;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 /// A point of the scene in both images: x and y in the left one and in the right one, in pixels.
 pub type Correspondence = [[f64; 2]; 2];

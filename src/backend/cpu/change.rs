@@ -3,7 +3,7 @@
 use super::units::{Units, argmin};
 use super::volumes::{Level, Volumes};
 use super::windows::Window;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
     let (width, Level { belief, windows, .. }) = (v.plan.levels[0].width, &v.levels[0]);

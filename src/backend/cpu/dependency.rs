@@ -12,7 +12,7 @@ use super::windows::{Seen, Window, Windows};
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Truncation, TruncationRule};
 use crate::program::Sent;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use std::array::from_fn;
 use std::ops::Range;
 

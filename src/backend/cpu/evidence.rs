@@ -6,7 +6,7 @@ use super::volumes::Volumes;
 use super::windows::{Window, Windows};
 use crate::plan::LevelPlan;
 use crate::program::Sent;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// The evidence of these rows.

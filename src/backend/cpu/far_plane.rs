@@ -11,7 +11,7 @@ use crate::plan::patches::{
     PATCH_STEP, PATCH_STEP_BITS, PATCH_WEIGHT_BITS, patches,
 };
 use crate::stage::{MapSet, Stage};
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use crate::weights::patch_weights;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {

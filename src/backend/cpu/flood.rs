@@ -10,7 +10,7 @@ use super::dependency::{self, Around, Factors, REACH, Scratch};
 use super::units::Units;
 use super::volumes::Volumes;
 use crate::backend::Stage;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use std::array::from_fn;
 use std::ops::Range;
 

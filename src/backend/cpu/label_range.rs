@@ -4,7 +4,7 @@ use super::units::Units;
 use super::volumes::Volumes;
 use crate::image::Plane;
 use crate::plan::{COST_FRACTION_BITS, COST_MAX, LevelPlan};
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let (plan, ranges) = (&v.plan.levels[level], &v.label_ranges[level]);

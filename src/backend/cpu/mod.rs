@@ -23,7 +23,7 @@ use crate::pause::Pause;
 use crate::plan::{Plan, VolumeWidth};
 use crate::program::{Part, Program, Run, Sent, sharing, together};
 use crate::stage::{Data, MapSet};
-use crate::threads::loops::current_num_threads;
+use crate::threads::prelude::current_num_threads;
 use std::future::ready;
 use std::ops::Range;
 use std::time::Duration;

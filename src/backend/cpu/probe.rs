@@ -11,7 +11,7 @@ use crate::graph::LevelGraph;
 use crate::image::Plane;
 use crate::plan::LevelPlan;
 use crate::stage::{PaddedRows, Volume, volume_shape};
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use std::hint::black_box;
 use std::mem;
 use web_time::Instant;

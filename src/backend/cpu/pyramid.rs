@@ -3,7 +3,7 @@
 use super::units::Units;
 use super::volumes::Volumes;
 use crate::plan::{LevelPlan, Plan};
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 const WEIGHTS: [u32; 5] = [1, 4, 6, 4, 1];
 

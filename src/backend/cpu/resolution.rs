@@ -7,7 +7,7 @@ use super::volumes::{Level, Volumes};
 use super::windows::{Window, Windows};
 use crate::plan::{LABEL_BLOCK, Truncation, TruncationRule};
 use crate::program::Sent;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 struct Scratch<U> {

@@ -4,7 +4,7 @@ use super::units::Units;
 use super::volumes::{Level, Volumes};
 use super::windows::Windows;
 use crate::plan::Plan;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// These rows of the right view.

@@ -11,7 +11,7 @@ use crate::plan::votes::{
     VOTE_REACH, VOTE_SHIFT, VOTE_SURE, Votes,
 };
 use crate::stage::MapSet;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use crate::weights::vote_weights;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {

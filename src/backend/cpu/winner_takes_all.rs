@@ -5,7 +5,7 @@ use super::volumes::{Level, Volumes};
 use super::windows::Windows;
 use crate::stage::NO_RUNNER_UP;
 use crate::stage::Optimum;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// The optima of these rows.

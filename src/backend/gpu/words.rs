@@ -3,7 +3,7 @@
 
 use super::uniform::LevelParams;
 use crate::image::{Image, Pixel, Plane};
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 /// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, to `words`, as long as that says all: as long as they are
 /// in whole 8-bit levels, and grey follows from colour. Returns whether it does.

@@ -20,7 +20,7 @@ use rustfft::{Fft, FftPlannerScalar};
 use super::lanes::{LANES, Lanes};
 use crate::front::illumination::{gaussian, smooth};
 use crate::image::Plane;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 /// The shortest wavelength, 4 / sqrt 2 pixels, squared (paper, section 3.1).
 const SHORTEST_SQUARED: usize = 8;

@@ -6,7 +6,7 @@
 //! version of any of them might change.
 
 use crate::options::ZoneExtent;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 /// Points that a thread takes at a time.
 const CHUNK: usize = 512;

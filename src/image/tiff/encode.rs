@@ -11,7 +11,7 @@ use tiff::tags::{CompressionMethod, PhotometricInterpretation, Predictor, Sample
 use crate::image::Plane;
 use crate::image::georeference::Georeference;
 use crate::threads;
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 /// Most pixels of a plain map. Few programs cannot read tiles and Deflate, and small maps need neither.
 const MAX_PLAIN: usize = 1 << 22;

@@ -6,7 +6,7 @@
 use crate::backend::cpu::units::{block, block_mut, each_lane, padding};
 use crate::image::{Image, Pair, Pixel};
 use crate::plan::{COST_MAX, LABEL_BLOCK, LevelPlan, Plan};
-use crate::threads::loops::*;
+use crate::threads::prelude::*;
 
 /// Bands per thread, so that one slow thread does not delay all others.
 const BANDS: usize = 4;
