@@ -10,7 +10,7 @@
 use crate::image::{Image, Plane};
 use crate::options::Method;
 use crate::plan::{GRAPH_WINDOW, Plan};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// The code of a slot that holds no pixel, because the neighbour is outside the image, masked, or missing.

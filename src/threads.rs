@@ -16,6 +16,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 #[cfg(not(target_arch = "wasm32"))]
 use std::sync::{Arc, Mutex, PoisonError};
 
+#[cfg_attr(target_arch = "wasm32", path = "threads/prelude_in_browser.rs")]
+pub(crate) mod prelude;
+
 /// The largest number of threads: more than any match can share, and few enough for every system.
 pub(crate) const MOST: usize = 1024;
 
@@ -179,12 +182,12 @@ pub fn run<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 /// How many threads there are for [`run`].
 #[must_use]
 pub fn count() -> usize {
-    run(rayon::current_num_threads)
+    run(prelude::current_num_threads)
 }
 
 /// Does both, at the same time where there are threads for it.
 pub fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
-    run(|| rayon::join(a, b))
+    run(|| prelude::join(a, b))
 }
 
 #[cfg(test)]

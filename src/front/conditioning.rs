@@ -13,6 +13,7 @@ use super::filter::{moved, smoothed};
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
 use crate::options::{DisparityRange, FrontOptions};
+use crate::threads::prelude::join;
 use std::fmt;
 
 /// What is corrected in a pair.
@@ -38,7 +39,7 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
     let looks_for_blocks = options.denoise && pair.full().is_none();
     let blocks = || if looks_for_blocks { compression::smoothing(pair) } else { 0.0 };
     // Each is too short for many threads, so they run beside each other.
-    let (blocks, (unlike, mut matches)) = rayon::join(blocks, || rayon::join(unlike, || matches_of(&halves)));
+    let (blocks, (unlike, mut matches)) = join(blocks, || join(unlike, || matches_of(&halves)));
     found.smoothing = unlike;
     if found != Conditioning::default() {
         matches = matches_of(&found.apply(pair).map(Image::downsampled));

@@ -4,13 +4,13 @@
 //! first; a masked row counts as the one above that is not, or as the first.
 
 use bytemuck::{Pod, cast_slice, cast_slice_mut};
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 use super::illumination::gaussian;
 use crate::image::cubic::{BITS, WEIGHTS};
 use crate::image::{Image, Pixel, Plane, grey};
 use crate::maps::FRACTION;
+use crate::threads::prelude::*;
 
 /// What filters work on: numbers of 16 bits, one or more a pixel.
 pub(super) trait Pixels: Pod + Send + Sync {}

@@ -4,9 +4,8 @@
 //! So the local geometric mean, which is the low-pass of the logarithm, stands for illumination, and dividing
 //! by it leaves reflectance. The paper gives only the size of the filter, 21 x 21; the rest is decided here.
 
-use rayon::prelude::*;
-
 use crate::image::{Image, Pixel, Plane, grey};
+use crate::threads::prelude::*;
 
 /// Radius of the filter in pixels: 21 x 21 in all, as in the paper.
 const RADIUS: usize = 10;

@@ -19,9 +19,9 @@ use crate::maps::FRACTION;
 use crate::memory;
 use crate::options::DisparityRange;
 use crate::threads;
+use crate::threads::prelude::*;
 use corners::{SPACING, cell, corners};
 use correlation::correlation;
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use view::{RADIUS, View};
@@ -142,7 +142,7 @@ fn surveyed(
 ) -> Survey {
     let reach = (pair.size().0 / REACH) as i32;
     let (min, max) = range.map_or((-reach, reach), |r| (r.min, r.max));
-    let (left, right) = rayon::join(|| View::new(pair.left()), || View::new(pair.right()));
+    let (left, right) = join(|| View::new(pair.left()), || View::new(pair.right()));
     let corners = corners(&left, zones, spacing);
     let matches = corners
         .par_iter()

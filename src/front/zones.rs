@@ -14,10 +14,9 @@ mod kmeans;
 mod lanes;
 pub mod regions;
 
-use rayon::prelude::*;
-
 use crate::image::{Image, Plane};
 use crate::options::ZoneExtent;
+use crate::threads::prelude::*;
 use gabor::{ORIENTATIONS, Response};
 pub use kmeans::Options;
 pub use regions::{MASKED, Zones};

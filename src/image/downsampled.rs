@@ -2,8 +2,8 @@
 
 use super::{Image, Pixel, Plane};
 use crate::threads;
+use crate::threads::prelude::*;
 use bytemuck::cast_slice;
-use rayon::prelude::*;
 
 /// The weights of the low-pass, in both directions.
 const WEIGHTS: [u32; 5] = [1, 4, 6, 4, 1];

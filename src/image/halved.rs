@@ -1,7 +1,7 @@
 //! Pairs at half their size, which keep the full one.
 
 use super::{Image, Pair, Pixel, Plane};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 impl Image {
     /// The image with as many columns and rows as make whole blocks of 2 x 2 pixels: the last ones are there twice where they are

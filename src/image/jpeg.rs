@@ -31,7 +31,10 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
     }
     let options =
         DecoderOptions::default().set_strict_mode(true).set_max_width(usize::MAX).set_max_height(usize::MAX);
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    // The decoder of `tiff` reads from a vector too. With a slice here, there would be two copies of its code, and the page waits for both.
+    let mut owned = memory::filled(bytes.len(), 0)?;
+    owned.copy_from_slice(bytes);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(owned), options);
     decoder.decode_headers().map_err(reason)?;
     let size = decoder.dimensions().ok_or_else(|| damaged("the JPEG file does not say its size"))?;
     check_claim((size.0 as u64, size.1 as u64), max_pixels, MAX_PIXELS_PER_BYTE, bytes.len())?;
@@ -41,7 +44,7 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
     };
     decoder.set_options(options.jpeg_set_out_colorspace(colours));
     let count = size.0 * size.1 * channels;
-    let _claim = Claim::new(count as u64 + BYTES_BESIDE * (size.0 * size.1) as u64)?;
+    let _claim = Claim::new((bytes.len() + count) as u64 + BYTES_BESIDE * (size.0 * size.1) as u64)?;
     let mut samples = memory::filled(count, 0)?;
     decoder.decode_into(&mut samples).map_err(reason)?;
     let orientation = decoder.exif().map_or(Orientation::UPRIGHT, |data| Orientation::of_exif(data));

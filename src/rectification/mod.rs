@@ -43,7 +43,7 @@ use crate::image::calib::{Calibration, Camera, Fit, Unit};
 use crate::image::{Image, Pair, Plane, Rect};
 use crate::memory;
 use crate::threads;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use sampling::{NOWHERE, Place};
 use std::borrow::Cow;
 

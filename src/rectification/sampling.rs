@@ -1,12 +1,11 @@
 //! Images at other places: cubic interpolation in integers.
 
-use rayon::prelude::*;
-
 use crate::error::Result;
 use crate::image::cubic::{BITS, STEPS, WEIGHTS};
 use crate::image::{Image, Pixel, Plane, grey};
 use crate::memory;
 use crate::threads;
+use crate::threads::prelude::*;
 
 /// A place in an image: x and y, in 1/[`STEPS`] px.
 pub(super) type Place = [i32; 2];

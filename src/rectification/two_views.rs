@@ -8,8 +8,6 @@
 //! The samples are the same in every run, sums are in a fixed order, and only + - * / and square roots and `libm` are used: the same
 //! bits on every machine, with any number of threads.
 
-use rayon::prelude::*;
-
 use super::least_squares::solved;
 use crate::calibration::cameras::Pose;
 use crate::calibration::lens::{Distortion, Lens};
@@ -18,6 +16,7 @@ use crate::calibration::matrix::{
 };
 use crate::error::Result;
 use crate::threads;
+use crate::threads::prelude::*;
 
 /// A point of the scene in both images: x and y in the left one and in the right one, in pixels.
 pub type Correspondence = [[f64; 2]; 2];

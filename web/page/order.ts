@@ -28,6 +28,9 @@ function compared(a: string, b: string): number {
     return [...words, ...both.map(([one, other]) => lower(one, other))].find((order) => order !== 0) ?? 0;
 }
 
+/** Files in the order of their names, as of views; as they came where their names do not tell. */
+export const ordered = <T extends { name: string }>(files: T[]): T[] => [...files].sort((a, b) => compared(a.name, b.name));
+
 /** Two views, the left one first; as they came where their names do not tell. */
 export function inOrder<T extends { name: string }>(a: T, b: T): [T, T] {
     return compared(a.name, b.name) > 0 ? [b, a] : [a, b];

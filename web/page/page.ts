@@ -61,12 +61,16 @@ type State = 'starting' | 'empty' | 'loading' | 'ready' | 'matching' | 'comparin
 const app = by('app');
 const client = new Client(new URL(WORKER, document.baseURI));
 const settings = new Settings(() => void checkRange());
-const slots = new Slots(SCENES, ({ match, rectify: by, swapped }) => {
-    if (!swapped) {
-        rectify = by;
-    }
-    void load(match);
-});
+const slots = new Slots(
+    SCENES,
+    ({ match, rectify: by, swapped }) => {
+        if (!swapped) {
+            rectify = by;
+        }
+        void load(match);
+    },
+    (files) => client.call('whole', files),
+);
 const map = new MapView((pixel) => readOut(pixel), (pixel) => ruler.pick(pixel));
 const points = new PointsTab((cameras) => client.call('points', cameras), () => {
     readOut(undefined);
@@ -280,15 +284,16 @@ async function open(signal: AbortSignal, left: Opened, right: Opened): Promise<R
             return undefined;
         }
     };
-    const known = calibration.length === 0 ? undefined : await tried<Known>(async () => {
+    const said = calibration.length === 0 ? undefined : await tried<{ known: Known | undefined }>(async () => {
         const found = await call('calibration', calibration, width, height);
-        const { size } = found;
+        const size = found?.size;
         if (size && (size.width !== width || size.height !== height)) {
             throw new Error(`${files} is for images of ${size.width} × ${size.height}, and these are ${width} × ${height}: it is not used.`);
         }
-        return found;
+        return { known: found };
     });
-    const wanted = rectify ?? (known && !known.rectified ? 'calibration' : 'nothing');
+    const known = said?.known;
+    const wanted = rectify ?? (said && !known ? 'calibration' : 'nothing');
     const by = wanted === 'calibration' || wanted === 'matches' ? wanted : undefined;
     const rectified = by && (await tried(() => call('rectify', by === 'calibration' ? calibration : undefined)));
     if (by === 'matches' && !rectified) {
@@ -298,7 +303,7 @@ async function open(signal: AbortSignal, left: Opened, right: Opened): Promise<R
     const read = { files, size: { width, height }, generation };
     return rectified
         ? { ...rectified, ...read, by, range: undefined }
-        : { ...raw, ...read, by: undefined, notes: [], cameras: known?.cameras, range: known?.range };
+        : { ...raw, ...read, by: undefined, notes: known?.notes ?? [], cameras: known?.cameras, range: known?.range };
 }
 
 /** Does another thing about the rectification of the pair, and matches it. */

@@ -60,15 +60,15 @@ export interface Text {
     text: string;
 }
 
-/** What a calibration says. */
+/** What a calibration says of images that are rectified already, scaled to their size where it is of another one with the same aspect. */
 export interface Known {
-    /** Of images that are rectified already, by its form. */
-    rectified: boolean;
     /** Labels 0 to ndisp - 1, as the program takes them. */
     range: Range | undefined;
+    /** The size of the images that it is of then. */
     size: { width: number; height: number } | undefined;
-    /** Those of images that are rectified already. */
     cameras: Cameras | undefined;
+    /** What is probably wrong with it, and whether it was scaled. */
+    notes: string[];
 }
 
 /** What is probably wrong, in the program's words, and what the page can do about it. */
@@ -153,8 +153,10 @@ export interface Calls {
     compare(device: Device): Comparison;
     picture(map: Map, colours: Colours): Picture;
     file(output: Output): Uint8Array<ArrayBuffer>;
-    /** What the files of a calibration say of images of this size. */
-    calibration(files: Text[], width: number, height: number): Known;
+    /** Whether these files are a calibration from which no other file is missing. */
+    whole(files: Text[]): boolean;
+    /** What the files of a calibration say of images of this size; undefined where these are not rectified yet. */
+    calibration(files: Text[], width: number, height: number): Known | undefined;
     /** Puts a rectified pair in the place of the pair: by a calibration, or without one by matches. */
     rectify(files: Text[] | undefined): Rectified;
     points(cameras: Cameras): Cloud;

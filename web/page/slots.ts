@@ -4,7 +4,7 @@ import { type Cut, cut, decoded, guess, views } from './decode';
 import { by, count, make, say, words } from './dom';
 import { type Named, dropped, named } from './dropped';
 import { type Header, header } from './header';
-import { inOrder } from './order';
+import { inOrder, ordered } from './order';
 import type { Picture, Text } from './protocol';
 import { Turns } from './turns';
 
@@ -55,6 +55,8 @@ interface Source {
 const other = (side: Side): Side => (side === 'left' ? 'right' : 'left');
 const listed = (files: { name: string }[]): string => files.map(({ name }) => name).join(', ');
 const keeping = (files: Text[]): string => `${listed(files)} is kept for your pair.`;
+/** The files that a calibration may have. */
+const MOST = 3;
 const READS = 'PNG, JPEG, WebP, AVIF, GIF, PNM, TIFF or PFM';
 /** Files that hold a calibration, or a list that is not for us. */
 const TEXT = /\.(txt|ya?ml|json|xml|ini|conf|cfg|calib|toml)$/i;
@@ -79,8 +81,12 @@ export class Slots {
     /** The scene that is fetched. */
     private readonly fetches = new Turns();
 
-    /** `changed` is called after every change of a view or of the calibration. */
-    constructor(scenes: Scene[], private readonly changed: (wish: Wish) => void) {
+    /** `changed` is called after every change of a view or of the calibration; `isWhole` says whether files are all of a calibration. */
+    constructor(
+        scenes: Scene[],
+        private readonly changed: (wish: Wish) => void,
+        private readonly isWhole: (files: Text[]) => Promise<boolean>,
+    ) {
         for (const side of SIDES) {
             const input = by<HTMLInputElement>(`${side}-file`);
             input.addEventListener('change', () => {
@@ -123,7 +129,7 @@ export class Slots {
         const others = files.filter(({ name }) => !TEXT.test(name));
         const likely = others.filter(({ name }) => !OTHER.test(name));
         const images = views((others.length > 2 || source.name !== undefined) && likely.length > 0 ? likely : others);
-        if (images.length > 2 || texts.length > 3) {
+        if (images.length > 2 || texts.length > MOST) {
             throw new Error(`These are ${count(files.length)} files. Take two views, and a calibration if you have one.`);
         }
         if (images.length + texts.length === 0) {
@@ -139,7 +145,8 @@ export class Slots {
             this.problem(side, words(error));
             return;
         }
-        const calibration = await Promise.all(texts.map(async ({ file, name }) => ({ name, text: await file.text() })));
+        const given = await Promise.all(texts.map(async ({ file, name }) => ({ name, text: await file.text() })));
+        const calibration = await this.completed(this.own && images.length === 0 ? this.calibration : this.kept, given);
         const [one, two] = read;
         if (one && two) {
             this.put({ left: one, right: two }, source, calibration);
@@ -181,6 +188,29 @@ export class Slots {
             const begins = pair ? `${view.name} begins a new pair. Give its other view, too. ` : '';
             say('pair-note', `${begins}${calibration.length > 0 ? keeping(calibration) : ''}`.trim());
         }
+    }
+
+    /** Whether both views are there, and no scene's. */
+    private get own(): boolean {
+        return this.views.left !== undefined && this.views.right !== undefined && this.scene === undefined;
+    }
+
+    /** New files of a calibration, with those before them that they complete. */
+    private async completed(before: Text[], files: Text[]): Promise<Text[]> {
+        if (before.length === 0 || files.length === 0 || (await this.isWhole(files)) || (await this.isWhole(before))) {
+            return files;
+        }
+        // A file takes the place of one of its name.
+        const others = before.filter(({ name }) => files.every((file) => file.name !== name));
+        // With the last one alone, and then with those before it, which may be of another calibration.
+        const sets = others.map((_, i) => ordered([...others.slice(others.length - 1 - i), ...files])).filter(({ length }) => length <= MOST);
+        for (const set of sets) {
+            if (await this.isWhole(set)) {
+                return set;
+            }
+        }
+        // A third file may be missing yet.
+        return sets.at(-1) ?? files;
     }
 
     /** A calibration without views. */

@@ -132,13 +132,26 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
         pair = new engine.StereoPair(await bytes(left), leftName, await bytes(right), rightName);
         return pictures(pair);
     },
+    async whole(files) {
+        try {
+            return await using(known(files), (of) => of.whole);
+        } catch (error) {
+            if (broken(error)) {
+                throw error;
+            }
+            return false;
+        }
+    },
     calibration(files, width, height) {
-        return using(known(files), (of) => ({
-            rectified: of.rectified,
-            range: of.labels ? { min: 0, max: of.labels - 1 } : undefined,
-            size: of.width && of.height ? { width: of.width, height: of.height } : undefined,
-            cameras: of.rectified ? told(of.cameras(width, height)) : undefined,
-        }));
+        return using(known(files), (all) => {
+            const found = all.rectified ? all.ofRectified(width, height) : undefined;
+            return found && using(found, (of) => ({
+                range: of.labels ? { min: 0, max: of.labels - 1 } : undefined,
+                size: of.width && of.height ? { width: of.width, height: of.height } : undefined,
+                cameras: told(of.cameras()),
+                notes: of.doubts(width),
+            }));
+        });
     },
     async rectify(files) {
         const raw = need(pair, 'pair');

@@ -3,8 +3,10 @@
 use crate::Thrown;
 use crate::pair::{Cameras, StereoPair};
 use crate::words::{By, doubt, thrown};
+use mrfgs::Error;
 use mrfgs::calibration::{self, cameras::StereoCalibration};
-use mrfgs::rectification::{Options, Rectification};
+use mrfgs::image::calib::Calibration;
+use mrfgs::rectification::{Doubt, Options, Rectification};
 use std::path::Path;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -34,33 +36,21 @@ impl Known {
         self.known.benchmark.is_some()
     }
 
-    /// The number of labels that it gives, from 0 on.
+    /// Whether no other file is missing: it is of images that are rectified already, or says the lenses and how the cameras stand.
     #[wasm_bindgen(getter)]
-    pub fn labels(&self) -> Option<u32> {
-        self.known.benchmark.as_ref()?.ndisp
+    pub fn whole(&self) -> bool {
+        let StereoCalibration { lenses, pose, views, .. } = &self.known;
+        self.rectified() || lenses.is_some() && (pose.is_some() || views.is_some())
     }
 
-    /// The width of its images, where it says so.
-    #[wasm_bindgen(getter)]
-    pub fn width(&self) -> Option<usize> {
-        Some(self.known.size?.0)
-    }
-
-    /// Their height.
-    #[wasm_bindgen(getter)]
-    pub fn height(&self) -> Option<usize> {
-        Some(self.known.size?.1)
-    }
-
-    /// The cameras of images that are rectified already; undefined where it says nothing of them.
+    /// What it says of images of this size that are rectified already; undefined where it does not say how they were rectified.
     ///
     /// # Errors
     /// Where it lacks a value.
-    pub fn cameras(&self, width: usize, height: usize) -> Thrown<Option<Cameras>> {
+    #[wasm_bindgen(js_name = "ofRectified")]
+    pub fn of_rectified(&self, width: usize, height: usize) -> Thrown<Option<OfRectified>> {
         let calibration = self.known.of_rectified_images(Some((width, height))).map_err(thrown)?;
-        // Some have the range alone.
-        let told = calibration.filter(|told| told.camera.is_some() || told.ndisp.is_none());
-        told.map(|told| Cameras::of(&told)).transpose()
+        Ok(calibration.map(|calibration| OfRectified { calibration, names: self.names.clone() }))
     }
 
     /// Rectifies a pair.
@@ -68,14 +58,70 @@ impl Known {
     /// # Errors
     /// Where the calibration lacks what this takes, or is for images of another size.
     pub fn rectify(&self, pair: &StereoPair) -> Thrown<Rectified> {
-        let by = Rectification::for_pair(&self.known, &pair.pair, &Options::default()).map_err(thrown)?;
+        let by = Rectification::for_pair(&self.known, &pair.pair, &Options::default());
+        let by = by.map_err(|error| match error {
+            Error::Mismatch(reason) => {
+                js_sys::Error::new(&format!("{}: {reason}: give images of that size", self.names))
+            }
+            error => thrown(error),
+        })?;
         let calibration = by.calibration().map_err(thrown)?;
         let cameras = Cameras::of(&calibration)?;
         let mut rectified = Rectified::new(&by, pair, By::Calibration)?;
         rectified.pair.doffs = calibration.doffs;
+        rectified.notes = named(&self.names, by.doubts());
         rectified.notes.insert(0, format!("rectified by {}", self.names));
         Ok(Rectified { cameras: Some(cameras), ..rectified })
     }
+}
+
+/// What a calibration says of images that are rectified already. Where they have another size than its own and the same aspect, it is
+/// scaled to theirs.
+#[wasm_bindgen]
+pub struct OfRectified {
+    calibration: Calibration,
+    names: String,
+}
+
+#[wasm_bindgen]
+impl OfRectified {
+    /// The number of labels that it gives, from 0 on.
+    #[wasm_bindgen(getter)]
+    pub fn labels(&self) -> Option<u32> {
+        self.calibration.ndisp
+    }
+
+    /// The width of the images that it is of, where it says so: another one than theirs where it has not their aspect.
+    #[wasm_bindgen(getter)]
+    pub fn width(&self) -> Option<u32> {
+        self.calibration.width
+    }
+
+    /// The height of the images that it is of.
+    #[wasm_bindgen(getter)]
+    pub fn height(&self) -> Option<u32> {
+        self.calibration.height
+    }
+
+    /// What is probably wrong with it for images of this width, and that it was scaled.
+    #[must_use]
+    pub fn doubts(&self, width: usize) -> Vec<String> {
+        named(&self.names, &Doubt::about(&self.calibration, Some(width)))
+    }
+
+    /// The cameras; undefined where it says nothing of them, but the range alone.
+    ///
+    /// # Errors
+    /// Where it lacks a value.
+    pub fn cameras(&self) -> Thrown<Option<Cameras>> {
+        let told = Some(&self.calibration).filter(|told| told.camera.is_some() || told.ndisp.is_none());
+        told.map(Cameras::of).transpose()
+    }
+}
+
+/// Doubts about the calibration of these files, each with their names.
+fn named(names: &str, doubts: &[Doubt]) -> Vec<String> {
+    doubts.iter().map(|cause| format!("{names}: {}", doubt(cause))).collect()
 }
 
 /// A pair that was rectified.

@@ -276,9 +276,25 @@ describe('inputs', () => {
         await works();
     });
 
+    it('takes a calib.txt of images of another size and the same aspect, scaled', async () => {
+        const calib = join(scene('mixed'), 'calib.txt');
+        await visit.pair(scene('thin'), calib);
+        // 48 labels for 320 pixels.
+        await visit.says('#range-found', /^0 to 35 px, by calib.txt$/);
+        assert.equal(await visit.text('#pair-problem'), '');
+        assert.match(await visit.text('#notes'), /calib\.txt: is for images of 320 x 240: those of 240 x 180 count as the same, scaled/i);
+        await visit.match({ preset: 'fast', device: 'cpu' });
+        assert.match(await visit.text('#notes'), /count as the same, scaled/);
+        const scaled = native(LEFT, RIGHT, ['--method', 'fast', '--calib', calib], ['points']);
+        assert.equal(difference((await visit.save('pfm')).bytes, scaled.pfm), undefined);
+        assert.equal(difference((await visit.save('ply')).bytes, scaled.points), undefined);
+        await works();
+    });
+
     it('says that a calib.txt is for other images, or makes no sense', async () => {
-        await visit.pair(scene('thin'), join(scene('mixed'), 'calib.txt'));
-        await visit.says('#pair-problem', /320 × 240.*240 × 180/);
+        writeFileSync(at('calib.txt'), 'width=300\nheight=180\nndisp=24\n');
+        await visit.pair(scene('thin'), at('calib.txt'));
+        await visit.says('#pair-problem', /300 × 180.*240 × 180/);
         writeFileSync(at('calib.txt'), 'cam0=[1 2 3]\n');
         await visit.pair(scene('thin'), at('calib.txt'));
         await visit.says('#pair-problem', /calib\.txt/);

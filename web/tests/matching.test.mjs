@@ -12,7 +12,7 @@ const views = (name) => ['im0.png', 'im1.png'].map((file) => join(scene(name), f
 const CALIBRATION = join(scene('mixed'), 'calib.txt');
 
 describe('the first map', () => {
-    it('takes 1.6 MB at most, by gzip', async () => {
+    it('takes 1.5 MB at most, by gzip', async () => {
         const asked = [];
         const visit = await Visit.open({
             before: async ({ tab, host }) => {
@@ -35,7 +35,7 @@ describe('the first map', () => {
         assert.ok(asked.length > files.length, 'the rest comes later');
         const packed = files.map((file) => gzipSync(readFileSync(join(SITE, file)), { level: 9 }).length);
         const sum = packed.reduce((sum, bytes) => sum + bytes, 0);
-        assert.ok(sum < 1_600_000, `${sum} bytes in ${files.join(', ')}`);
+        assert.ok(sum < 1_500_000, `${sum} bytes in ${files.join(', ')}`);
     });
 });
 

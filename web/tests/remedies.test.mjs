@@ -175,6 +175,57 @@ describe('remedies', () => {
         assert.match(await visit.tab.$eval('#cameras-note', (note) => note.textContent), /cameras\.yml/);
     });
 
+    it('joins the files of a calibration that come one by one', async () => {
+        const entries = readFileSync(CAMERAS, 'utf8').replace(/^[^]*?---\n/, '').split(/\n(?=\w)/);
+        const write = (name, lines) => writeFileSync(join(folder, name), `%YAML:1.0\n---\n${lines.join('\n')}\n`);
+        const of = (pattern) => entries.filter((entry) => pattern.test(entry));
+        write('lenses.yml', of(/^(imageSize|unit|[KD]\d)/));
+        for (const [name, number] of [['lens left.yml', '1'], ['lens right.yml', '2']]) {
+            write(name, ['imageSize: [ 240, 180 ]', ...of(new RegExp(`^[KD]${number}`)).map((entry) => entry.replace(number, ''))]);
+        }
+        write('pose.yml', of(/^(unit|[RT]):/));
+        write('other.yml', ['unit: m']);
+        const expected = native(...RAW, [...FAST, '--rectify', '--calib', CAMERAS]);
+        const give = (name) => visit.changed(() => visit.choose('left', join(folder, name)));
+        const rectified = async (by) => {
+            await visit.says('#notes', by);
+            assert.equal(await visit.text('#pair-problem'), '');
+            await visit.match({ range: 'automatic' });
+            assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
+        };
+        for (const order of [['lenses.yml', 'pose.yml'], ['pose.yml', 'lenses.yml'], ['other.yml', 'pose.yml', 'lenses.yml']]) {
+            assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'ready');
+            for (const name of order.slice(0, -1)) {
+                assert.equal(await give(name), 'ready');
+                await visit.says('#pair-problem', /\w/);
+            }
+            assert.equal(await give(order.at(-1)), 'ready');
+            await rectified(/Rectified by (lenses\.yml, pose\.yml|pose\.yml, lenses\.yml)\b/);
+        }
+        // Three of them, the lens of the right camera first, and before their pair.
+        await visit.scene('mixed');
+        for (const name of ['pose.yml', 'lens right.yml', 'lens left.yml']) {
+            await visit.choose('left', join(folder, name));
+            await visit.says('#pair-note', new RegExp(name.replace('.', '\\.')));
+        }
+        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'ready');
+        await rectified(/Rectified by lens left\.yml, pose\.yml, lens right\.yml/);
+        // A whole one takes the place of all.
+        assert.equal(await visit.changed(() => visit.choose('left', CAMERAS)), 'ready');
+        await rectified(/Rectified by cameras\.yml/);
+    });
+
+    it('scales a calibration to images of its aspect, and names one of another', async () => {
+        const text = readFileSync(CAMERAS, 'utf8');
+        const sized = (name, size) => writeFileSync(join(folder, name), text.replace('[ 240, 180 ]', size));
+        sized('larger.yml', '[ 480, 360 ]');
+        sized('wider.yml', '[ 320, 180 ]');
+        assert.equal(await visit.changed(() => visit.choose('left', ...RAW, join(folder, 'larger.yml'))), 'ready');
+        await visit.says('#notes', /Rectified by larger\.yml.*larger\.yml: is for images of 480 x 360.*count as the same, scaled/i);
+        assert.equal(await visit.changed(() => visit.choose('left', ...RAW, join(folder, 'wider.yml'))), 'ready');
+        await visit.says('#pair-problem', /wider\.yml: .*320 x 180.*240 x 180/);
+    });
+
     it('keeps a calibration that comes before its pair', async () => {
         assert.equal(await visit.scene('mixed'), 'done');
         await visit.choose('left', join(scene('thin'), 'calib.txt'));

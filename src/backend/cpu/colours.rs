@@ -1,7 +1,7 @@
 //! Colours in 8 bits a channel, and their means over blocks of pixels.
 
 use crate::image::{Image, Plane};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 /// Channels of a pixel in 8 bits.
 pub(super) fn channels(pixel: [u16; 4]) -> [u8; 3] {

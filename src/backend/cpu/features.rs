@@ -8,7 +8,7 @@ use crate::plan::{
     Plan,
 };
 use crate::stage::Optimum;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 const CENSUS_X: usize = CENSUS_RADIUS_X as usize;

@@ -24,6 +24,7 @@ use crate::pause::Pause;
 use crate::plan::{Plan, VolumeWidth};
 use crate::program::{Part, Program, Run, sharing, together};
 use crate::stage::{Data, MapSet};
+use crate::threads::prelude::current_num_threads;
 use std::future::ready;
 use std::time::Duration;
 use volumes::Volumes;
@@ -65,7 +66,7 @@ impl Cpu {
 
 impl Backend for Cpu {
     fn describe(&self) -> String {
-        let threads = rayon::current_num_threads();
+        let threads = current_num_threads();
         format!("the CPU path, {threads} thread{}", if threads == 1 { "" } else { "s" })
     }
 

@@ -11,7 +11,7 @@ use crate::graph::LevelGraph;
 use crate::image::Plane;
 use crate::plan::LevelPlan;
 use crate::stage::{PaddedRows, Volume, volume_shape};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::hint::black_box;
 use std::mem;
 use web_time::Instant;
@@ -28,7 +28,7 @@ impl Cpu {
         let from = vec![1u8; COPIED_BYTES];
         let mut to = vec![0u8; COPIED_BYTES];
         // One piece per thread: copies of long runs bypass the caches.
-        let piece = COPIED_BYTES.div_ceil(rayon::current_num_threads());
+        let piece = COPIED_BYTES.div_ceil(current_num_threads());
         let mut rate = || {
             let start = Instant::now();
             to.par_chunks_mut(piece)

@@ -3,13 +3,15 @@
 
 use super::uniform::LevelParams;
 use crate::image::{Image, Pixel, Plane};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 /// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, to `words`, as long as that says all: as long as they are
 /// in whole 8-bit levels, and grey follows from colour. Returns whether it does.
 pub(super) fn narrow_words(image: &Image, pitch: u32, words: &mut [u32]) -> bool {
-    let rows = words.par_chunks_exact_mut(pitch as usize).enumerate();
-    rows.all(|(y, row)| narrow_row(image.pixels.row(y), image.masked.row(y), row))
+    words
+        .par_chunks_exact_mut(pitch as usize)
+        .enumerate()
+        .all(|(y, row)| narrow_row(image.pixels.row(y), image.masked.row(y), row))
 }
 
 #[pulp::with_simd(narrow_row = crate::vectors::widest())]

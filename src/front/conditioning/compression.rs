@@ -1,7 +1,7 @@
 //! Compression: JPEG cuts an image into blocks of 8 x 8 pixels, and the lower the quality, the higher the steps between them.
 
 use crate::image::{Image, Pair};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::array::from_fn;
 
 /// By how much both views are smoothed (a standard deviation in pixels), where the steps between blocks are at least this many times as

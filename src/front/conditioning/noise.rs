@@ -4,7 +4,7 @@ use super::rows::MIN_MATCHES;
 use crate::front::matches::Match;
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::array::from_fn;
 
 /// By how much both views are smoothed (a standard deviation in pixels), where they share less of their finest detail than this

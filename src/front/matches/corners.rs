@@ -2,7 +2,7 @@
 
 use super::view::View;
 use crate::image::Plane;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::collections::BTreeMap;
 
 /// Smallest number of pixels per corner: dense enough for the statistics of a small zone.

@@ -1,7 +1,7 @@
 //! What a search needs of each view: grey values, sums over windows, and the structure tensor.
 
 use crate::image::{Image, Plane};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 /// The structure tensor is a sum over 5 x 5 pixels.
 const TENSOR_RADIUS: usize = 2;

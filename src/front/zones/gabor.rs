@@ -14,13 +14,13 @@ use std::array::from_fn;
 use std::f64::consts::SQRT_2;
 use std::sync::Arc;
 
-use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlannerScalar};
 
 use super::lanes::{LANES, Lanes};
 use crate::front::illumination::{gaussian, smooth};
 use crate::image::Plane;
+use crate::threads::prelude::*;
 
 /// The shortest wavelength, 4 / sqrt 2 pixels, squared (paper, section 3.1).
 const SHORTEST_SQUARED: usize = 8;

@@ -5,9 +5,8 @@
 //! its update counts the old centroid as one more point, and it brings 27 crates for a result that the next
 //! version of any of them might change.
 
-use rayon::prelude::*;
-
 use crate::options::ZoneExtent;
+use crate::threads::prelude::*;
 
 /// Points that a thread takes at a time.
 const CHUNK: usize = 512;

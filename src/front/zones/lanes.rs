@@ -8,12 +8,13 @@ use std::ops::{Add, Div, Mul, Neg, Rem, Sub};
 use rustfft::num_complex::Complex;
 use rustfft::num_traits::{FromPrimitive, Num, One, Signed, Zero};
 
-/// Number of lanes: the width of the vectors that every processor has.
-pub(super) const LANES: usize = 4;
+/// Number of lanes: the width of the vectors that every processor has. One in a browser, where transforms with more of them would make up a
+/// tenth of the engine that visitors load, for one preset.
+pub(super) const LANES: usize = if cfg!(target_arch = "wasm32") { 1 } else { 4 };
 
 /// [`LANES`] numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(align(16))]
+#[cfg_attr(not(target_arch = "wasm32"), repr(align(16)))]
 pub(super) struct Lanes(pub(super) [f32; LANES]);
 
 impl Lanes {

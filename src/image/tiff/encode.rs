@@ -2,7 +2,6 @@
 
 use std::io::{self, Cursor, Seek, Write};
 
-use rayon::prelude::*;
 use tiff::TiffResult;
 use tiff::encoder::colortype::Gray32Float;
 use tiff::encoder::compression::{CompressionAlgorithm, Deflate, DeflateLevel};
@@ -12,6 +11,7 @@ use tiff::tags::{CompressionMethod, PhotometricInterpretation, Predictor, Sample
 use crate::image::Plane;
 use crate::image::georeference::Georeference;
 use crate::threads;
+use crate::threads::prelude::*;
 
 /// Most pixels of a plain map. Few programs cannot read tiles and Deflate, and small maps need neither.
 const MAX_PLAIN: usize = 1 << 22;

@@ -7,7 +7,7 @@ use crate::backend::cpu::windows::{Seen, Window, Windows};
 use crate::graph::{Incoming, LevelGraph};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan};
 use crate::program::Sent;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// The terms of the beliefs of a level.

@@ -3,7 +3,7 @@
 use crate::backend::cpu::units::{Units, argmin};
 use crate::backend::cpu::volumes::{Level, Volumes};
 use crate::backend::cpu::windows::Window;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
     let (width, Level { belief, windows, .. }) = (v.plan.levels[0].width, &v.levels[0]);

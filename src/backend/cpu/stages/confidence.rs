@@ -4,7 +4,7 @@ use crate::image::Pair;
 use crate::maps::flag;
 use crate::plan::Plan;
 use crate::stage::MapSet;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 /// Pixels that are worth a thread.
 const LEAST: usize = 1 << 14;

@@ -8,7 +8,7 @@ use crate::backend::cpu::volumes::Volumes;
 use crate::image::Pair;
 use crate::options::MatchingCost;
 use crate::plan::Plan;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
     let Volumes { plan, pair, features, fine_cost: out, .. } = v;

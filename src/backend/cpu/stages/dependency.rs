@@ -12,7 +12,7 @@ use crate::backend::cpu::windows::{Seen, Window, Windows};
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Truncation, TruncationRule};
 use crate::program::Sent;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::array::from_fn;
 use std::ops::Range;
 

@@ -8,7 +8,7 @@ use crate::maps::{FRACTION, Maps, flag, has_disparity};
 use crate::plan::Plan;
 use crate::stage::MapSet;
 use crate::stage::enlarge::{AWAY, NEAR};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     let image = pair.full().expect("the pair at full size").left();

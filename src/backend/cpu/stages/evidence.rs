@@ -6,7 +6,7 @@ use crate::backend::cpu::volumes::Volumes;
 use crate::backend::cpu::windows::{Window, Windows};
 use crate::plan::LevelPlan;
 use crate::program::Sent;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// The evidence of these rows.

@@ -11,8 +11,8 @@ use crate::plan::patches::{
     PATCH_STEP, PATCH_STEP_BITS, PATCH_WEIGHT_BITS, patches,
 };
 use crate::stage::{MapSet, Stage};
+use crate::threads::prelude::*;
 use crate::weights::patch_weights;
-use rayon::prelude::*;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     if !Stage::FarPlane.is_taken(&plan.method) {

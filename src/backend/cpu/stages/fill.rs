@@ -5,7 +5,7 @@ use crate::maps::flag;
 use crate::options::Nearer;
 use crate::plan::Plan;
 use crate::stage::MapSet;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
     let farther = match plan.method.refinement.nearer {

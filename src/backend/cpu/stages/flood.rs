@@ -10,7 +10,7 @@ use super::dependency::{self, Around, Factors, REACH, Scratch};
 use crate::backend::cpu::units::Units;
 use crate::backend::cpu::volumes::Volumes;
 use crate::backend::Stage;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::array::from_fn;
 use std::ops::Range;
 
@@ -36,7 +36,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let l = &plan.levels[level];
     let (height, windows) = (l.height, summands.windows);
     let slots = summands.graph.slots();
-    let threads = rayon::current_num_threads();
+    let threads = current_num_threads();
     let most = (BANDS * threads).min(height / LEAST_ROWS).max(1);
     // As many for each thread.
     let count = if most > threads { most / threads * threads } else { most };

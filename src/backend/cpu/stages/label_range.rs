@@ -4,7 +4,7 @@ use crate::backend::cpu::units::Units;
 use crate::backend::cpu::volumes::Volumes;
 use crate::image::Plane;
 use crate::plan::{COST_FRACTION_BITS, COST_MAX, LevelPlan};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let (plan, ranges) = (&v.plan.levels[level], &v.label_ranges[level]);

@@ -7,7 +7,7 @@ use crate::image::Plane;
 use crate::plan::{
     LABEL_BLOCK, LevelPlan, WINDOW_MARGIN, WINDOW_REACH, WINDOW_RUN, WINDOW_SLACK, WINDOW_STEP,
 };
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let (l, held) = (&v.plan.levels[level], v.plan.rows_held(level));

@@ -6,7 +6,7 @@ use crate::options::LeftRightCheck;
 use crate::plan::Plan;
 use crate::stage::MapSet;
 use crate::stage::NO_LABEL;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     let left = pair.left();

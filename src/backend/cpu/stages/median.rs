@@ -13,8 +13,8 @@ use crate::options::Median;
 use crate::plan::Plan;
 use crate::plan::planes::PLANE_START_BITS;
 use crate::stage::MapSet;
+use crate::threads::prelude::*;
 use crate::weights::{MEDIAN_WEIGHT, MedianWeights, WINDOW_ROW_BITS};
-use rayon::prelude::*;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     let guide = pair.left();

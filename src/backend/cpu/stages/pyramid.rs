@@ -3,7 +3,7 @@
 use crate::backend::cpu::units::Units;
 use crate::backend::cpu::volumes::Volumes;
 use crate::plan::{LevelPlan, Plan};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 const WEIGHTS: [u32; 5] = [1, 4, 6, 4, 1];
 

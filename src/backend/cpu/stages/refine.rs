@@ -11,7 +11,7 @@ use crate::maps::FRACTION;
 use crate::plan::Plan;
 use crate::stage::refine::{COLUMNS, NEAR, NO_CENSUS, OTHERS, REACH};
 use crate::stage::{MapSet, Optimum};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// Half-size rows that are processed together.

@@ -7,7 +7,7 @@ use crate::backend::cpu::volumes::{Level, Volumes};
 use crate::backend::cpu::windows::{Window, Windows};
 use crate::plan::{LABEL_BLOCK, Truncation, TruncationRule};
 use crate::program::Sent;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 struct Scratch<U> {

@@ -4,7 +4,7 @@ use crate::backend::cpu::units::Units;
 use crate::backend::cpu::volumes::{Level, Volumes};
 use crate::backend::cpu::windows::Windows;
 use crate::plan::Plan;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// These rows of the right view.

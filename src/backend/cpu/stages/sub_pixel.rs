@@ -11,7 +11,7 @@ use crate::maps::FRACTION;
 use crate::plan::LevelPlan;
 use crate::stage::NO_LABEL;
 use crate::stage::{MapSet, Optimum};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// The disparities of these rows.

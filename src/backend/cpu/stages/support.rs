@@ -5,7 +5,7 @@ use crate::maps::flag;
 use crate::plan::Plan;
 use crate::plan::support::{SUPPORT_NEAR, SUPPORT_PLACES, SUPPORT_REACH, SUPPORT_STEP};
 use crate::stage::MapSet;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::iter::repeat_n;
 
 /// Rows that are worth a thread.

@@ -11,8 +11,8 @@ use crate::plan::votes::{
     VOTE_REACH, VOTE_SHIFT, VOTE_SURE, Votes,
 };
 use crate::stage::MapSet;
+use crate::threads::prelude::*;
 use crate::weights::vote_weights;
-use rayon::prelude::*;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     let left = pair.left();

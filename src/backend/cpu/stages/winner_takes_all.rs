@@ -5,7 +5,7 @@ use crate::backend::cpu::volumes::{Level, Volumes};
 use crate::backend::cpu::windows::Windows;
 use crate::stage::NO_RUNNER_UP;
 use crate::stage::Optimum;
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// The optima of these rows.

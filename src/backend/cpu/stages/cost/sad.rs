@@ -6,7 +6,7 @@
 use crate::backend::cpu::units::{block, block_mut, each_lane, padding};
 use crate::image::{Image, Pair, Pixel};
 use crate::plan::{COST_MAX, LABEL_BLOCK, LevelPlan, Plan};
-use rayon::prelude::*;
+use crate::threads::prelude::*;
 
 /// Bands per thread, so that one slow thread does not delay all others.
 const BANDS: usize = 4;
@@ -18,7 +18,7 @@ pub(super) fn costs(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     let level = &plan.levels[0];
     let row_cells = level.width * level.stride;
     let window = plan.method.cost.sad_window as usize;
-    let rows = level.height.div_ceil(BANDS * rayon::current_num_threads()).max(LEAST_WINDOWS * window);
+    let rows = level.height.div_ceil(BANDS * current_num_threads()).max(LEAST_WINDOWS * window);
     let means = Means::new(plan);
     out.par_chunks_mut(rows * row_cells).enumerate().for_each(|(i, out)| {
         let (first, radius) = (i * rows, window / 2);
