@@ -23,7 +23,7 @@ struct Params {
 @group(0) @binding(6) var<storage, read_write> next_flags: array<u32>;
 // For every row: 1 if it holds a valid pixel, else 0; and the row that it takes its values from.
 @group(0) @binding(7) var<storage, read_write> known_rows: array<u32>;
-@group(0) @binding(8) var<storage, read_write> source_rows: array<u32>;
+@group(0) @binding(8) var<storage, read_write> row_sources: array<u32>;
 
 // Whether each row holds a valid pixel. One invocation per row.
 @compute @workgroup_size(GROUP)
@@ -60,7 +60,7 @@ fn sources(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
             break;
         }
     }
-    source_rows[y] = source;
+    row_sources[y] = source;
 }
 
 // Fills invalid pixels with the farther of the two nearest valid disparities. One invocation per pixel.
@@ -71,7 +71,7 @@ fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
-    let source = source_rows[params.band.first_row + id.y];
+    let source = row_sources[params.band.first_row + id.y];
     if source < params.source_first_row || source >= params.source_first_row + params.source_rows {
         return;
     }

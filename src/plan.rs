@@ -10,7 +10,6 @@
 //! saturate; a label whose cost saturates is no longer a candidate, so its exact cost does not matter.
 
 mod arithmetic;
-mod memory;
 pub mod patches;
 pub mod planes;
 pub mod support;

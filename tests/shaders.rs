@@ -8,10 +8,14 @@
 mod variants;
 
 use mrfgs::low_level::backend::Stage;
-use mrfgs::low_level::backend::gpu::{Bound, Kernel, MAX_LOOP_ITERATIONS, UniformLayout, binding_number, kernels};
+use mrfgs::low_level::backend::gpu::{
+    Bound, Kernel, MAX_LOOP_ITERATIONS, UniformLayout, binding_number, kernels,
+};
 use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::program::{Step, schedule};
+use mrfgs::low_level::stage::{Data, Start};
 use mrfgs::options::{DisparityRange, Method};
-use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Module, ShaderStage, TypeInner};
 use std::collections::{BTreeMap, HashSet};
 use std::sync::LazyLock;
@@ -248,4 +252,135 @@ fn every_shader_translates_to_spirv_msl_and_hlsl() {
         }
         Ok(())
     });
+}
+
+/// What is wrong with the data that `stage` declares under `plan`, held against what its kernels read and write: nothing that is bound is
+/// undeclared, and nothing is read that neither the stage was given nor an earlier kernel of it has written.
+fn check_data(stage: Stage, plan: &Plan, kernels: &[Kernel]) -> Result<HashSet<Data>, String> {
+    let reads: HashSet<_> = stage.reads(plan).collect();
+    let writes: HashSet<_> = stage.writes().collect();
+    let needs: HashSet<_> = stage.needs(plan).collect();
+    let (mut bound, mut written) = (HashSet::new(), HashSet::new());
+    for kernel in kernels {
+        let (module, info) = validated(&kernel.shader.source())?;
+        let info = info.get_entry_point(entry_point(kernel, &module));
+        let mut now = Vec::new();
+        for binding in &kernel.bound {
+            let variable =
+                module.global_variables.iter().find(|(_, v)| v.name.as_deref() == Some(binding.name));
+            let usage = info[variable.ok_or("no such variable")?.0];
+            let level = stage.level().unwrap_or(0) + usize::from(kernel.coarser);
+            let all = Data::bound(plan, binding.data, level);
+            let error = |what: &str| {
+                Err(format!("`{}` of {} {what} {:?} {all:?}", binding.name, kernel.shader.entry, stage))
+            };
+            if all.is_empty() {
+                // The coarsest level has no messages from above, and the finest none from below.
+                let elsewhere =
+                    (0..plan.levels.len()).any(|z| !Data::bound(plan, binding.data, z).is_empty());
+                let is_known = elsewhere || !stage.is_taken(&plan.method);
+                if !is_known {
+                    return error("is no data of");
+                }
+                continue;
+            }
+            let declared = |set: &HashSet<Data>| all.iter().any(|data| set.contains(data));
+            if usage.contains(GlobalUse::WRITE) {
+                if !declared(&writes) && !declared(&needs) {
+                    return error("is written and not declared by");
+                }
+                now.extend(all.iter().copied());
+            }
+            if usage.contains(GlobalUse::READ) && !declared(&reads) && !declared(&written) {
+                let both = usage.contains(GlobalUse::WRITE) && declared(&needs);
+                if !both {
+                    return error("is read, and neither declared nor written before, by");
+                }
+            }
+            bound.extend(all);
+        }
+        // Output beside an array takes its place.
+        let replaced = |data: &Data| match *data {
+            Data::NextGuide(z) => vec![Data::Guide(z)],
+            _ => Vec::new(),
+        };
+        written.extend(now.iter().flat_map(replaced).collect::<Vec<_>>());
+        written.extend(now);
+    }
+    Ok(bound)
+}
+
+/// Every array that a kernel binds is data that the descriptor of its stage names, with the access that it declares, and every datum
+/// that it names is bound in some plan.
+#[test]
+fn stages_declare_what_their_kernels_bind() {
+    let (mut seen, mut unbound, mut bound) = (HashSet::new(), HashSet::new(), HashSet::new());
+    for plan in PLANS.iter() {
+        for stage in Stage::all(plan).into_iter().filter(|stage| stage.name() != "flood") {
+            let kernels = kernels(stage, plan);
+            let declared = stage.reads(plan).chain(stage.writes()).chain(stage.needs(plan));
+            let declared: Vec<_> = declared.filter(|data| data.is_there(plan)).collect();
+            let shaders: Vec<_> = kernels.iter().map(|kernel| kernel.shader.clone()).collect();
+            if !seen.insert((stage, shaders, declared.clone())) {
+                continue;
+            }
+            let found = check_data(stage, plan, &kernels).unwrap_or_else(|error| panic!("{error}"));
+            unbound.extend(declared.into_iter().map(|data| (stage, data.array(plan).name)));
+            bound.extend(found.into_iter().map(|data| (stage, data.array(plan).name)));
+        }
+    }
+    let unbound: Vec<_> = unbound.difference(&bound).collect();
+    assert!(unbound.is_empty(), "declared, and bound by no kernel: {unbound:?}");
+}
+
+/// Control: data that a stage does not name, and reads of what nobody has written, are noticed.
+#[test]
+fn undeclared_data_are_noticed() {
+    let plan = &PLANS[0];
+    let of = |stage: Stage| kernels(stage, plan);
+    check_data(Stage::Support, plan, &of(Stage::Support)).unwrap();
+    // Votes read labels, which planes do not name, and need sums.
+    assert!(check_data(Stage::FarPlane, plan, &of(Stage::VoteFill)).is_err());
+    // The second kernel reads what the first one has written.
+    let check = |kernels: &[Kernel]| check_data(Stage::Fill, plan, kernels);
+    let fill = of(Stage::Fill);
+    check(&fill).unwrap();
+    assert!(check(&fill[1..]).is_err());
+}
+
+/// Whether each datum that `steps` read has been written before, or was there from the start.
+fn check_order(plan: &Plan, steps: &[Step]) -> Result<(), String> {
+    let at_start = |data: &Data| data.array(plan).start != Start::Anything;
+    let mut written: HashSet<_> = Data::all(plan).into_iter().filter(at_start).collect();
+    // Windows hold all labels until they are found.
+    written.extend((0..plan.levels.len()).map(Data::Windows));
+    for stage in steps.iter().filter_map(Step::stage) {
+        // Without messages of its factors, a level needs no graph.
+        let counts = |data: &Data| match *data {
+            Data::Members(z) | Data::Incoming(z) => plan.floods(z),
+            _ => true,
+        };
+        if let Some(data) = stage.reads(plan).filter(counts).find(|data| !written.contains(data)) {
+            return Err(format!("{stage:?} reads {data:?}, which nobody has written"));
+        }
+        written.extend(stage.writes());
+    }
+    Ok(())
+}
+
+#[test]
+fn data_are_written_before_they_are_read() {
+    for plan in PLANS.iter() {
+        check_order(plan, &schedule::steps(plan))
+            .unwrap_or_else(|error| panic!("{error}: {:?}", plan.method));
+    }
+    // Control: without the stage that finds the labels, those that read them are noticed.
+    let plan = &PLANS[0];
+    let steps: Vec<_> = schedule::steps(plan);
+    let without = |missing: Stage| {
+        let rest = steps.iter().filter(|step| step.stage() != Some(missing)).cloned();
+        check_order(plan, &rest.collect::<Vec<_>>())
+    };
+    assert!(without(Stage::WinnerTakesAll).is_err());
+    assert!(without(Stage::Evidence(0)).is_err());
 }

@@ -1,6 +1,8 @@
 //! Planes from far away: the constants and the shape of [`Stage::FarPlane`](crate::backend::Stage::FarPlane).
 
 use super::Plan;
+use super::votes;
+use crate::options::{MatchSize, Method};
 
 /// Side of a patch, in pixels.
 pub const PATCH: usize = 4;
@@ -40,6 +42,12 @@ pub const PATCH_SHARE_BITS: u32 = 3;
 pub const PATCH_DOUBT: u32 = 24;
 /// It is outvoted by a plane that is further from its disparity than this, in 1/256 px: half a pixel.
 pub const PATCH_OUTVOTES: i32 = 128;
+
+/// Whether `method` carries planes far. At half size a patch would see too much at once.
+#[must_use]
+pub fn are_taken(method: &Method) -> bool {
+    votes::are_taken(method) && method.refinement.plane && method.schedule.match_size != MatchSize::Half
+}
 
 /// (width, height) of the patches of a match.
 #[must_use]

@@ -1,6 +1,7 @@
 //! Votes for what no match shows: the constants and the shape of [`Stage::VoteFill`](crate::backend::Stage::VoteFill).
 
 use super::Plan;
+use crate::options::{Fill, Method};
 
 /// Distance from a voter's disparity, in 1/256 px, from which on its vote against a label is the same: 4 px.
 pub const VOTE_MOST: i32 = 1024;
@@ -25,6 +26,12 @@ pub const VOTE_REACH: usize = 8;
 pub const VOTE_AWAY: u32 = 2;
 /// Words that the sums of a band take, unless a row takes more (open).
 const BAND_WORDS: usize = 4 << 20;
+
+/// Whether `method` fills by votes.
+#[must_use]
+pub fn are_taken(method: &Method) -> bool {
+    method.refinement.fill == Fill::Votes
+}
 
 /// The shape of the votes of a match: half-size pixels, and every second label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,11 +3,11 @@
 //! A row of [`Data::array`] says how a device stores a datum: the name by which shaders bind it, its words in a row, and how its rows lie
 //! over the image. Buffers, bindings, the memory of a plan, and the tests that hold descriptors against shaders follow from it.
 
-use super::Stage;
-use crate::plan::patches::{PATCH, PATCH_WORDS, patches};
-use crate::plan::votes::Votes;
+use crate::plan::patches::{self, PATCH, PATCH_WORDS};
+use crate::plan::votes::{self, Votes};
 use crate::plan::{Plan, ROW_ALIGN};
 use crate::weights::{MedianWeights, patch_weights, vote_weights};
+use std::collections::HashSet;
 use std::ops::Range;
 
 /// Stands for "no label", in the right view where no left pixel projects.
@@ -415,7 +415,7 @@ impl Data {
             Self::LabelMap => fine("label_map", 1).starting(Zero),
             Self::Squares => fine("squares", 1),
             Self::RowSums => Array::table("row_sums", 2 * height),
-            Self::Convergence => Array::table("convergence", 5).starting(Zero),
+            Self::Convergence => Array::table("convergence", 6).starting(Zero),
             Self::Groups => Array::table("groups", 0),
             Self::Map(Map::Label | Map::Best | Map::RunnerUp) => fine("optima", Map::Label.words()),
             Self::Map(Map::RightLabel | Map::RightBest) => fine("right_labels", 1),
@@ -427,7 +427,7 @@ impl Data {
             Self::Parents => fine("parents", 1).of_band(height),
             Self::Sizes => fine("sizes", 1).of_band(height),
             Self::KnownRows => Array::table("known_rows", height),
-            Self::SourceRows => Array::table("source_rows", height),
+            Self::SourceRows => Array::table("row_sources", height),
             Self::Shown => fine("shown", 1).place(Place::In(Self::NextFlags)),
             Self::HalfColours => votes_of("half_colours", 1),
             Self::Elected => votes_of("elected", 1),
@@ -435,7 +435,7 @@ impl Data {
             Self::Totals => votes_of("totals", votes().labels).of_band(votes().band),
             Self::VoteWeights => constant("vote_weights"),
             Self::Patches => {
-                let words = padded(PATCH_WORDS * patches(plan).0);
+                let words = padded(PATCH_WORDS * patches::patches(plan).0);
                 rows("patches", words, Extent::Patches).place(Place::AnyVolume)
             }
             Self::PatchShares => constant("patch_shares"),
@@ -557,10 +557,19 @@ impl Data {
         maps.chain(others).collect()
     }
 
+    /// The data that belong to no level, one for each array that there is under `plan`.
+    #[must_use]
+    pub fn arrays_of_match(plan: &Plan) -> Vec<Self> {
+        let mut names = HashSet::new();
+        let there = Self::of_match().into_iter().filter(|data| data.is_there(plan));
+        there.filter(|data| names.insert(data.array(plan).name)).collect()
+    }
+
     /// Everything that a match by `plan` holds.
     #[must_use]
     pub fn all(plan: &Plan) -> Vec<Self> {
-        let levels = (0..plan.levels.len()).flat_map(|z| Self::of_levels(z).into_iter().chain(Self::of_level(z)));
+        let levels =
+            (0..plan.levels.len()).flat_map(|z| Self::of_levels(z).into_iter().chain(Self::of_level(z)));
         levels.chain(Self::of_match()).filter(|data| data.is_there(plan)).collect()
     }
 
@@ -581,9 +590,9 @@ impl Data {
                 plan.full.is_some()
             }
             Self::HalfColours | Self::Elected | Self::Sums | Self::Totals | Self::VoteWeights => {
-                Stage::VoteFill.is_taken(&plan.method)
+                votes::are_taken(&plan.method)
             }
-            Self::Patches | Self::PatchShares => Stage::FarPlane.is_taken(&plan.method),
+            Self::Patches | Self::PatchShares => patches::are_taken(&plan.method),
             other => other.level().is_none_or(|z| z < levels),
         }
     }
@@ -607,8 +616,7 @@ impl Data {
     #[must_use]
     pub fn bound(plan: &Plan, name: &str, level: usize) -> Vec<Self> {
         let (name, level) = Self::place_of(name, level);
-        let is_meant =
-            |data: &Self| data.level().is_none_or(|z| z == level) && data.array(plan).name == name;
+        let is_meant = |data: &Self| data.level().is_none_or(|z| z == level) && data.array(plan).name == name;
         Self::all(plan).into_iter().filter(is_meant).collect()
     }
 

@@ -86,7 +86,7 @@
 //! (Moments and not sums: however far they come, they fit in 32 bits.)
 
 use super::{Data, Descriptor, Map, maps};
-use crate::options::{Fill, MatchSize};
+use crate::plan::patches;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| {
@@ -95,11 +95,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     },
     writes: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
     needs: |_| vec![Data::Patches],
-    // At half size a patch would see too much at once.
-    taken: |method| {
-        let refinement = &method.refinement;
-        refinement.fill == Fill::Votes && refinement.plane && method.schedule.match_size != MatchSize::Half
-    },
+    taken: patches::are_taken,
     pixel: 8.0,
     ..Descriptor::NONE
 };

@@ -12,13 +12,13 @@
 //! - The weights are those [`of_filled`](crate::weights::MedianWeights::of_filled) pixels.
 
 use super::{Data, Descriptor, Map, maps};
-use crate::options::Fill;
+use crate::plan::votes;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| [maps(&[Map::Disparity, Map::Validity]), vec![Data::LEFT, Data::FillWeights]].concat(),
     writes: |_| maps(&[Map::Disparity]),
     needs: |_| vec![Data::NextDisparity],
-    taken: |method| method.refinement.fill == Fill::Votes,
+    taken: votes::are_taken,
     pixel: 48.0,
     ..Descriptor::NONE
 };

@@ -44,7 +44,10 @@ use super::{Data, Descriptor};
 pub(super) const ROW: Descriptor = Descriptor {
     // The guide of a level is that of the next finer one at half its size.
     reads: |z| vec![Data::Guide(z.saturating_sub(1))],
-    writes: |z| [vec![Data::Members(z), Data::Incoming(z)], Vec::from_iter((z > 0).then_some(Data::Guide(z)))].concat(),
+    writes: |z| {
+        [vec![Data::Members(z), Data::Incoming(z)], Vec::from_iter((z > 0).then_some(Data::Guide(z)))]
+            .concat()
+    },
     needs: |z| vec![Data::NextGuide(z)],
     joins: true,
     pixel: 34.0,

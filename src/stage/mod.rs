@@ -6,6 +6,7 @@
 
 mod data;
 mod map_set;
+mod memory;
 
 use crate::options::Method;
 use crate::plan::Plan;

@@ -48,7 +48,8 @@ use super::{Data, Descriptor, Volume, volumes};
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |z| {
-        let volumes = volumes(&[Volume::Belief(z - 1), Volume::Belief(z), Volume::Down(z - 1), Volume::Up(z)]);
+        let volumes =
+            volumes(&[Volume::Belief(z - 1), Volume::Belief(z), Volume::Down(z - 1), Volume::Up(z)]);
         [volumes, vec![Data::Windows(z), Data::Windows(z - 1)]].concat()
     },
     writes: |z| volumes(&[Volume::Down(z - 1), Volume::Up(z)]),

@@ -75,7 +75,7 @@
 //!    and its confidence 0.
 
 use super::{Data, Descriptor, Map, maps};
-use crate::options::Fill;
+use crate::plan::votes;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| {
@@ -84,7 +84,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     },
     writes: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
     needs: |_| vec![Data::Shown, Data::HalfColours, Data::Elected, Data::Sums, Data::Totals],
-    taken: |method| method.refinement.fill == Fill::Votes,
+    taken: votes::are_taken,
     pixel: 60.0,
     ..Descriptor::NONE
 };

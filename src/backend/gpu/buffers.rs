@@ -63,7 +63,8 @@ impl Parts {
         let words = |data: Data| data.array(plan).words;
         let narrow = words(Data::Incoming(z)).max(words(Data::Members(z)));
         // A volume of two bytes a label is the widest beside that of all slots.
-        let wide = words(Data::Volume(Volume::Dependency(z))).max(2 * words(Data::Volume(Volume::Evidence(z))));
+        let wide =
+            words(Data::Volume(Volume::Dependency(z))).max(2 * words(Data::Volume(Volume::Evidence(z))));
         let height = plan.levels[z].height as u32;
         let streamed = z == 0 && !plan.holds_all_rows();
         let starts = part_starts(device, plan, height, if streamed { narrow } else { wide }, u32::MAX)?;
@@ -102,7 +103,8 @@ impl Buffers {
         let finest_shared = Self::finest_shared(a.device, plan);
         let levels: Vec<_> = plan.levels.iter().map(|level| LevelParams::new(plan, level)).collect();
         let mut arrays = HashMap::new();
-        let pools = (finest_shared < levels.len()).then(|| Self::pools(a, plan, finest_shared)).transpose()?;
+        let pools =
+            (finest_shared < levels.len()).then(|| Self::pools(a, plan, finest_shared)).transpose()?;
         let mut pools = pools.unwrap_or_default();
         // Levels take turns with it.
         let most = (1..levels.len()).map(|z| Data::NextGuide(z).array(plan).bytes() / 4).max().unwrap_or(0);
@@ -142,11 +144,8 @@ impl Buffers {
                 }
             }
         }
-        for data in Data::of_match().into_iter().filter(|data| data.is_there(plan)) {
+        for data in Data::arrays_of_match(plan).into_iter().filter(|data| *data != Data::Groups) {
             let array = data.array(plan);
-            if data == Data::Groups || arrays.contains_key(&(array.name, 0)) {
-                continue;
-            }
             let rows = match array.place {
                 Place::In(other) => arrays[&(other.array(plan).name, 0)].1.clone(),
                 _ if array.start == Start::Constant => {

@@ -349,7 +349,8 @@ impl<'a> Recorder<'a> {
             return Ok(pipeline.clone());
         }
         let source = shader.source();
-        let number = |bound: &Bound| binding_number(&source, bound.name).expect("the shader has what is bound");
+        let number =
+            |bound: &Bound| binding_number(&source, bound.name).expect("the shader has what is bound");
         let numbers = bound.iter().map(number).collect();
         let device = self.device.inner()?;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {

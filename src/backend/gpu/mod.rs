@@ -47,8 +47,8 @@ use device::Device;
 pub use device::FaultInjection;
 pub use kernel::{Bound, Kernel, MAX_LOOP_ITERATIONS};
 pub use shader::{Constant, Shader, binding_number};
-use stages::{record, record_levels, record_upload};
 pub use stages::{kernels, other_kernels};
+use stages::{record, record_levels, record_upload};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -173,8 +173,17 @@ impl Gpu {
         record: impl FnOnce(&mut Recorder<'a>) -> Result<()>,
     ) -> Result<Arc<[Command]>> {
         let Self { device, pipelines, .. } = self;
-        let mut recorder =
-            Recorder { device, pipelines, plan, buffers, level, only: None, source: None, endings, commands: Vec::new() };
+        let mut recorder = Recorder {
+            device,
+            pipelines,
+            plan,
+            buffers,
+            level,
+            only: None,
+            source: None,
+            endings,
+            commands: Vec::new(),
+        };
         record(&mut recorder)?;
         Ok(recorder.commands.into())
     }
@@ -219,7 +228,8 @@ impl Gpu {
         for (z, l) in plan.levels.iter().enumerate().filter(|_| plan.limits_labels()) {
             let words = |ranges: &Plane<_>| label_range_words(ranges, &buffers.levels[z]);
             let all = || words(&Plane::filled(l.width, l.height, [0, l.labels as u16 - 1]));
-            array(Data::LabelRange(z)).write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
+            array(Data::LabelRange(z))
+                .write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
         }
         // Where not all rows are held, those of a part become 0 when it is entered.
         let by_parts = |data: &Data| !plan.holds_all_rows() && data.level() == Some(0);

@@ -1,9 +1,9 @@
 //! Reads and writes volumes and maps on a device, and measures its copy rate.
 
-use super::stages::record_transposed;
-use super::{Gpu, State};
 use super::rows::Rows;
+use super::stages::record_transposed;
 use super::words::window_words;
+use super::{Gpu, State};
 use crate::backend::probe::Probe;
 use crate::backend::{Backend, Map};
 use crate::error::{Error, Result};
@@ -67,7 +67,9 @@ impl Probe for Gpu {
 
     fn set_windows(&mut self, level: usize, windows: &Plane<[u16; 2]>) -> Result<()> {
         self.submit()?;
-        let [(buffer, place)] = &self.state().buffers.rows(&self.state().plan, Data::Windows(level)).own()[..] else {
+        let [(buffer, place)] =
+            &self.state().buffers.rows(&self.state().plan, Data::Windows(level)).own()[..]
+        else {
             unreachable!("one row is in one part")
         };
         self.device.write_at(buffer, place.start, bytemuck::cast_slice(&window_words(windows)))
@@ -107,9 +109,8 @@ impl Probe for Gpu {
             }
         }
         state.buffers.rows(&state.plan, Data::Members(level)).write(&mut self.device, &words)?;
-        let commands = self.recorded_at(level, &state.plan, &state.buffers, None, |recorder| {
-            record_transposed(recorder)
-        })?;
+        let commands = self
+            .recorded_at(level, &state.plan, &state.buffers, None, |recorder| record_transposed(recorder))?;
         self.state = Some(state);
         self.record(&commands)
     }

@@ -1,7 +1,7 @@
 //! Planes carried over from far away: see [`crate::backend::Stage::FarPlane`].
 
-use crate::backend::cpu::colours::{difference, mean_colours};
 use super::plane::limits;
+use crate::backend::cpu::colours::{difference, mean_colours};
 use crate::image::{Pair, Plane};
 use crate::maps::flag;
 use crate::plan::Plan;

@@ -7,9 +7,9 @@
 
 use super::belief::{self, Summands};
 use super::dependency::{self, Around, Factors, REACH, Scratch};
+use crate::backend::Stage;
 use crate::backend::cpu::units::Units;
 use crate::backend::cpu::volumes::Volumes;
-use crate::backend::Stage;
 use crate::threads::prelude::*;
 use std::array::from_fn;
 use std::ops::Range;

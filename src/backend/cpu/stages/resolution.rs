@@ -2,7 +2,9 @@
 //!
 //! Rows of labels are processed with their padding; values that belong to no label count as infinite.
 
-use crate::backend::cpu::units::{Units, block, block_mut, each_lane, keep_least, padding, smallest, truncate};
+use crate::backend::cpu::units::{
+    Units, block, block_mut, each_lane, keep_least, padding, smallest, truncate,
+};
 use crate::backend::cpu::volumes::{Level, Volumes};
 use crate::backend::cpu::windows::{Window, Windows};
 use crate::plan::{LABEL_BLOCK, Truncation, TruncationRule};

@@ -2,8 +2,8 @@
 //!
 //! Floor, a label: 3 bytes moved, 4 asked for (the costs twice, for their minimum), 25 operations for four.
 
-use crate::backend::gpu::commands::Recorder;
 use super::cost;
+use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
 use crate::error::Result;
 use crate::plan::COST_FRACTION_BITS;

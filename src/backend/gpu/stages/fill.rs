@@ -9,9 +9,9 @@ use crate::stage::{Data, Map};
 shader! {
     "fill"(plan, level) { source_first_row: u32, source_rows: u32, farther_is_larger: u32 }
     rows { flags, known_rows } => Variant::new(plan.levels[0].width);
-    sources { known_rows, source_rows } => Variant::new(plan.levels[0].height);
+    sources { known_rows, row_sources } => Variant::new(plan.levels[0].height);
     fill {
-        disparity, flags, source_disparity, source_flags, next_disparity, next_flags, source_rows
+        disparity, flags, source_disparity, source_flags, next_disparity, next_flags, row_sources
     } => Variant::new(plan.levels[0].width);
 }
 

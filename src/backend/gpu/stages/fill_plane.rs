@@ -1,8 +1,8 @@
 //! Planes through the disparities of filled pixels: see [`Stage::FillPlane`](crate::backend::Stage::FillPlane).
 
-use crate::backend::gpu::commands::Recorder;
 use super::{median, plane};
-use crate::backend::gpu::Kernel;
+use crate::backend::gpu::commands::Recorder;
+use crate::backend::gpu::kernel::Kernel;
 use crate::error::Result;
 use crate::plan::Plan;
 use crate::weights::{FILL_STEP_BITS, MedianWeights};

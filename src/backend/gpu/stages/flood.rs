@@ -3,8 +3,8 @@
 //! A device goes over all pixels at once, so it gains nothing by going over messages and beliefs together: the stage has no
 //! shader of its own.
 
-use crate::backend::gpu::Kernel;
 use crate::backend::gpu::commands::Recorder;
+use crate::backend::gpu::kernel::Kernel;
 use crate::error::Result;
 use crate::plan::Plan;
 

@@ -100,7 +100,7 @@ fn record_guide(r: &mut Recorder) -> Result<()> {
 }
 
 /// Finds for every pixel the factors that hold it.
-pub(in crate::backend::gpu) fn record_transposed(r: &mut Recorder) -> Result<()> {
+pub(super) fn record_transposed(r: &mut Recorder) -> Result<()> {
     r.renew(Data::Members(r.level));
     if r.plan.neighbours == 0 {
         return Ok(());

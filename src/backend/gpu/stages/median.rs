@@ -47,7 +47,8 @@ pub(super) fn over_window(
     let every = 1 + u32::from(weights.checkered);
     let variant = Variant::new(passes * (window + 1) * window + 8 + more).with("EVERY", every);
     let reach = (weights.radius as u32) << weights.step_bits[1];
-    let bound = [("left", reach), ("disparity", reach), ("flags", reach), ("space", 0), ("next_disparity", 0)];
+    let bound =
+        [("left", reach), ("disparity", reach), ("flags", reach), ("space", 0), ("next_disparity", 0)];
     Kernel::new(shader, bound.to_vec(), specialised(variant)).taking("space", "median_weights")
 }
 

@@ -7,9 +7,7 @@ use super::kernel::Kernel;
 use crate::error::Result;
 use crate::plan::Plan;
 use crate::stage::Stage;
-pub(super) use graph::record_transposed;
 use std::ops::Range;
-pub(super) use upload::record as record_upload;
 
 macro_rules! declare {
     (
@@ -57,7 +55,6 @@ pub fn other_kernels(plan: &Plan) -> Vec<Kernel> {
     upload::kernels(plan, 0)
 }
 
-
 /// Records a stage at several levels at once.
 pub(super) type RecordLevels = fn(&mut Recorder, Range<usize>) -> Result<()>;
 
@@ -72,4 +69,14 @@ const OVER_LEVELS: [(&str, RecordLevels); 4] = [
 /// How `stage` goes over levels at once, where it can.
 pub(super) fn record_levels(stage: Stage) -> Option<RecordLevels> {
     OVER_LEVELS.into_iter().find(|(name, _)| *name == stage.name()).map(|(_, record)| record)
+}
+
+/// Records how the words of a pair are taken apart.
+pub(super) fn record_upload(r: &mut Recorder) -> Result<()> {
+    upload::record(r)
+}
+
+/// Records how the factors that hold each pixel are found.
+pub(super) fn record_transposed(r: &mut Recorder) -> Result<()> {
+    graph::record_transposed(r)
 }

@@ -2,10 +2,10 @@
 //!
 //! Floor, a pixel: half of that of the median, and in each of two rounds 1,500 bytes asked for (53 places) and 2,500 operations.
 
-use crate::backend::gpu::commands::Recorder;
-use crate::backend::gpu::shader::Shader;
 use super::median;
-use crate::backend::gpu::Kernel;
+use crate::backend::gpu::commands::Recorder;
+use crate::backend::gpu::kernel::Kernel;
+use crate::backend::gpu::shader::Shader;
 use crate::error::Result;
 use crate::plan::Plan;
 use crate::plan::planes::{PLANE_BITS, PLANE_FARTHEST, PLANE_START_BITS, PLANE_STEEPEST};

@@ -2,8 +2,8 @@
 //!
 //! Floor, for a fine label of level 1: 1 + 2/8 bytes moved, 31 asked for (the 5 x 5 window), 100 operations for four labels.
 
-use crate::backend::gpu::commands::Recorder;
 use super::cost;
+use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
 use crate::backend::gpu::uniform::LevelParams;
 use crate::error::Result;

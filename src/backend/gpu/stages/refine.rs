@@ -4,8 +4,8 @@
 //! views and their costs, 400 bytes and 300 operations for the fit.
 
 use crate::backend::gpu::commands::Recorder;
-use crate::backend::gpu::uniform::full_pitch;
 use crate::backend::gpu::kernel::{Variant, shader};
+use crate::backend::gpu::uniform::full_pitch;
 use crate::error::Result;
 use crate::stage::refine::{COLUMNS, NEAR, NO_CENSUS, REACH};
 

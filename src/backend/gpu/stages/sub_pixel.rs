@@ -1,7 +1,7 @@
 //! Disparities between the labels: see [`Stage::SubPixel`](crate::backend::Stage::SubPixel).
 
-use crate::backend::gpu::commands::Recorder;
 use super::cost;
+use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
 use crate::error::Result;
 

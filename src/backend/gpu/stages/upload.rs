@@ -10,7 +10,7 @@ shader! {
 }
 
 /// Takes the words of the pair apart.
-pub(in crate::backend::gpu) fn record(r: &mut Recorder) -> Result<()> {
+pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let width = r.params().width;
     r.rows(&main(r.plan, 0), &Uniform {}, width)
 }

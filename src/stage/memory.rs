@@ -1,9 +1,9 @@
 //! What a match takes of the memory, at most.
 
-use super::patches::{PATCH_WORDS, patches};
-use super::votes::Votes;
-use super::{GRAPH_WINDOW, LABEL_BLOCK, Plan, RING_PART, ROW_ALIGN};
-use crate::options::{Fill, Illumination};
+use super::{Data, Extent, Place, Start};
+use crate::options::Illumination;
+use crate::plan::votes::Votes;
+use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan, RING_PART, ROW_ALIGN};
 
 /// So many costs of level 0 are held whole, at most, where its other volumes are not.
 const MOST_COSTS: u64 = 1 << 27;
@@ -60,14 +60,18 @@ impl Plan {
         };
         // The member codes, and the transposed table with its row starts, and the guide.
         let on_host = l.width * (self.neighbours + 4 * self.slots() + 4 + 9);
-        // A device needs less for these, but keeps candidates and label ranges as well. The guide of level 1 is there twice, and that of
-        // level 0 is a map.
-        let guides = [0, 2, 1][level.min(2)];
-        let maps = 2 + 4 * guides + has(level > 0) + has(self.limits_labels());
-        let on_device = maps * aligned(4 * l.width) + aligned(4 * l.width * self.neighbours.div_ceil(4));
-        let (runs, window_rows) = l.windows();
-        let windows = 2 * aligned(4 * runs * window_rows);
-        (rows * row + costs + l.height * on_host.max(on_device) + windows) as u64
+        // A device needs less for these, but keeps candidates and label ranges as well.
+        let of_level = Data::of_levels(level).into_iter().chain(Data::of_level(level));
+        let graph = of_level.filter(|data| match data {
+            // The left view counts as a map, and levels take turns with the next guide.
+            Data::Volume(_) | Data::Guide(0) => false,
+            Data::NextGuide(z) => *z == 1,
+            data => data.is_there(self),
+        });
+        let (windows, maps): (Vec<_>, Vec<_>) =
+            graph.map(|data| data.array(self)).partition(|array| array.extent == Extent::Table);
+        let bytes = |arrays: Vec<super::Array>| arrays.iter().map(super::Array::bytes).sum::<u64>();
+        (rows * row + costs) as u64 + bytes(maps).max((l.height * on_host) as u64) + bytes(windows)
     }
 
     /// Largest number of bytes taken by the images and all maps.
@@ -78,32 +82,35 @@ impl Plan {
         let (width, height) = self.size();
         // At full size: the views, their census and the maps, of four times as many pixels.
         let full = if self.full.is_some() { 4 * (2 * 9 + 2 * 4 + 16) + 16 } else { 0 };
-        // Beside them, what a device keeps of each row, and its tables.
-        let maps =
-            (100 + right + full) * width.next_multiple_of(ROW_ALIGN / 4) * height + 16 * height + (1 << 14);
-        maps as u64 + self.vote_bytes() + self.patch_bytes()
+        // What a device keeps beside them, with its tables.
+        let is_map = |data: &Data| {
+            let array = data.array(self);
+            let counted =
+                matches!(array.extent, Extent::Level(_) | Extent::Table) && *data != Data::BlockCosts;
+            counted && array.place == Place::Own && array.start != Start::Constant
+        };
+        let maps = Data::arrays_of_match(self).into_iter().chain([Data::LEFT]).filter(is_map);
+        let maps: u64 = maps.map(|data| data.array(self).bytes()).sum();
+        let more = (right + full) * width.next_multiple_of(ROW_ALIGN / 4) * height + (1 << 14);
+        maps + more as u64 + self.vote_bytes() + self.patch_bytes()
     }
 
     /// Largest number of bytes taken by the votes on invalid pixels.
     fn vote_bytes(&self) -> u64 {
-        if self.method.refinement.fill != Fill::Votes {
+        if !Data::Sums.is_there(self) {
             return 0;
         }
         let votes = Votes::of(self);
+        // The CPU path pads labels.
         let padded = votes.labels.next_multiple_of(LABEL_BLOCK / 2);
         let sums = aligned(4 * votes.width * padded) * (votes.band + votes.summed());
         // The half-size image and the votes, and a device's table of weights.
         (sums + 2 * aligned(4 * votes.width) * votes.height + (1 << 13)) as u64
     }
 
-    /// Largest number of bytes taken by planes from far away.
+    /// Largest number of bytes taken by planes from far away: the patches, and a device's table of weights.
     fn patch_bytes(&self) -> u64 {
-        if self.method.refinement.fill != Fill::Votes {
-            return 0;
-        }
-        let (width, height) = patches(self);
-        // The patches, and a device's table of weights.
-        (aligned(4 * PATCH_WORDS * width) * height + (1 << 11)) as u64
+        if Data::Patches.is_there(self) { Data::Patches.array(self).bytes() + (1 << 11) } else { 0 }
     }
 
     /// Largest number of bytes that the host takes besides the pair before it hands it to a backend. Per pixel: 66 to
