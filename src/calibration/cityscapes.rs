@@ -1,11 +1,11 @@
-//! The `camera.json` of Cityscapes: that of a pair that is rectified already.
+//! The `camera.json` of Cityscapes, for a rectified pair.
 
 use super::cameras::{StereoCalibration, Views};
 use super::node::Entries;
 use crate::error::Result;
 use crate::image::calib::{Camera, Unit};
 
-/// Whether these entries are such a file's.
+/// Whether the file is Cityscapes's.
 pub(super) fn is(entries: &Entries) -> bool {
     let has = |group: &str, name: &str| {
         let group = entries.find(group).and_then(|entry| entry.group().ok());

@@ -8,7 +8,7 @@ use super::matrix::IDENTITY;
 use crate::error::Result;
 use crate::image::calib::{Calibration, Camera};
 
-/// Whether a text is meant as such a file.
+/// Whether a text is meant to be such a file.
 pub(super) fn is(text: &str) -> bool {
     Calibration::is_meant(text)
 }

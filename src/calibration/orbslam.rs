@@ -1,4 +1,4 @@
-//! The settings of ORB-SLAM3, and of ORB-SLAM2 where its pair is rectified already.
+//! The settings of ORB-SLAM3, and those of ORB-SLAM2 for rectified pairs.
 
 use super::cameras::{StereoCalibration, Views};
 use super::lens::{Distortion, Lens, RadialTangential};
@@ -9,7 +9,7 @@ use super::posed::apart;
 use crate::error::Result;
 use crate::image::calib::{Camera, Unit};
 
-/// Whether these entries are such settings. Those of ORB-SLAM2 that name lenses have OpenCV's matrices.
+/// Whether the file is such settings. Those of ORB-SLAM2 with lenses have OpenCV's matrices instead.
 pub(super) fn is(entries: &Entries) -> bool {
     entries.find("camera1.fx camera.bf").is_some() && !opencv::has_lens(entries)
 }
