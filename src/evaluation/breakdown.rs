@@ -1,5 +1,5 @@
-//! Where the errors of a map are: each pixel with known truth is in one class, by what makes it hard to
-//! match.
+//! Breaks the errors of a map down by class: each pixel with known truth is in one class, by what makes it
+//! hard to match.
 
 use serde::Serialize;
 use serde::ser::Serializer;
@@ -27,7 +27,7 @@ const SLANTED: f64 = 0.2;
 pub enum Class {
     /// Its match, x - truth, lies outside the right image: below 0 or above width - 1.
     Border,
-    /// One view does not see it, by the mask (not 255). Without a mask the class is empty.
+    /// Only one view sees it, by the mask (not 255). Without a mask the class is empty.
     Occluded,
     /// The known truths in the 7 x 7 window around it span more than 4 px.
     Edge,
@@ -355,7 +355,7 @@ mod tests {
         (truth, row(&[128, 128, 128, 0, 255, 255, 255, 255]), chequered(8, 1, |_| 0))
     }
 
-    /// The errors of a map of this case.
+    /// The errors of a map of [`case`].
     fn found() -> Breakdown {
         let (truth, mask, image) = case();
         let estimate = row(&[5.0, 2.0, 6.0, INF, 2.0, 3.0, 4.0, 9.0]);
@@ -396,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn means_add_up_and_say_nothing_of_what_a_pair_lacks() {
+    fn means_add_up_and_omit_what_a_pair_lacks() {
         let (truth, _, image) = case();
         let one = found();
         let perfect = ground(&truth, None).breakdown(&truth, &image).unwrap();
@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_must_agree_and_something_be_known() {
+    fn sizes_must_agree_and_some_truth_be_known() {
         let (truth, mask, image) = case();
         let masked = ground(&truth, Some(&mask));
         let error = masked.breakdown(&Plane::filled(7, 1, 2.0), &image).unwrap_err().to_string();

@@ -60,7 +60,7 @@ pub fn zonal(range: DisparityRange, zones: (&Plane<u32>, usize), matches: &[Matc
     map.map(|zone| intervals.get(*zone as usize).copied().unwrap_or(full))
 }
 
-/// First and last label index of each pixel, at every level of `plan`, in the form that backends take.
+/// First and last label index of each pixel, at every level of `plan`, in the form for backends.
 #[must_use]
 pub fn levels(plan: &Plan, zones: &Zones, matches: &[Match]) -> Vec<Plane<[u16; 2]>> {
     let mut label_range =

@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use view::{RADIUS, View};
 
-/// Approximate maximum of corners where no range is given: they only serve an overview then, and each is
+/// Approximate maximum of corners without a given range: they only serve an overview then, and each is
 /// searched in a whole row.
 const OVERVIEW: usize = 8192;
 /// Without a range, the search covers disparities up to 1 / `REACH` of the width, of either sign.
@@ -82,7 +82,7 @@ pub fn find(pair: &Pair, zones: Option<(&Plane<u32>, usize)>, range: Option<Disp
 /// copies of the pixels and mask of one view, or one of both, for trying other orientations.
 const BYTES: u64 = 2 * (2 + 4 + 8) + 8 + 2 * 9;
 
-/// Fails where the machine has not enough memory to search `pair`.
+/// Fails if the machine has too little memory to search `pair`.
 ///
 /// # Errors
 /// [`Error::Memory`](crate::Error::Memory).
@@ -168,7 +168,7 @@ fn surveyed(
     Survey { corners: corners.collect(), matches }
 }
 
-/// The position where a window is found again.
+/// The position at which a window is found.
 struct Optimum {
     x: usize,
     y: usize,
@@ -179,8 +179,8 @@ struct Optimum {
     score: f64,
 }
 
-/// The one position in `columns`, within `rows` of its own row, where the window of `of` around (x, y) is
-/// found in `within`. `None` where the best score is too low, has a runner-up, or is no optimum along the
+/// The position in `columns`, within `rows` of its own row, at which the window of `of` around (x, y) is
+/// found in `within`. `None` if the best score is too low, has a close runner-up, or is no optimum along the
 /// row.
 fn peak(
     of: &View,
@@ -190,8 +190,8 @@ fn peak(
     rows: usize,
 ) -> Option<Optimum> {
     let (width, height) = within.grey.size();
-    // As many columns again on either side: a pattern that repeats there gives no reliable match here, and an
-    // optimum needs columns around it.
+    // Search as many columns again on either side: a pattern that repeats there makes the match ambiguous,
+    // and an optimum needs columns around it.
     let aside = columns.end() - columns.start() + 1;
     let first = (columns.start() - aside).max(RADIUS as i32);
     let last = (columns.end() + aside).min(width as i32 - 1 - RADIUS as i32);
@@ -204,7 +204,7 @@ fn peak(
     let scores: Vec<Vec<f64>> =
         (top..=bottom).map(|v| correlation(of, (x, y), within, v, first..=last)).collect();
 
-    // Of equal scores the last one; the runner-up test then rejects it.
+    // The last one of equal scores; the runner-up test then rejects it.
     let (mut score, mut at) = (f64::NEG_INFINITY, None);
     for (v, row) in scores.iter().enumerate() {
         let best = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -239,7 +239,7 @@ fn vertex(before: f64, peak: f64, after: f64) -> i32 {
     if bend < 0.0 { ((before - after) / (2.0 * bend) * f64::from(FRACTION) + 0.5).floor() as i32 } else { 0 }
 }
 
-/// The median; 0 of nothing.
+/// The median; 0 if there are no values.
 pub(super) fn median(values: impl Iterator<Item = i32>) -> i32 {
     let mut values: Vec<i32> = values.collect();
     values.sort_unstable();

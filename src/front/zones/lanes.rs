@@ -1,4 +1,4 @@
-//! Numbers side by side, so that one transform processes several rows or columns with vectors.
+//! Numbers side by side, so that one transform processes several rows or columns with vector instructions.
 //!
 //! Each lane goes through the operations of a single transform, in the same order, and ends with the same bits.
 
@@ -100,7 +100,7 @@ impl FromPrimitive for Lanes {
     }
 }
 
-// The transforms ask for these two, and use nothing of them.
+// The transforms require these two traits, but do not use them.
 
 impl Num for Lanes {
     type FromStrRadixErr = <f32 as Num>::FromStrRadixErr;
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_lane_has_the_bits_of_a_single_transform() {
-        // Large factors go another way than small ones.
+        // Large factors take a different code path from small ones.
         for length in [1, 2, 30, 194, 450, 2 * 149] {
             let value = |i: usize| ((i * 7919) % 1013) as f32 / 13.0 - 30.0;
             let number =
