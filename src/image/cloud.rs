@@ -1,11 +1,11 @@
-//! Clouds of points, and what their files say of them.
+//! Point clouds.
 
 use super::calib::Unit;
 
 /// A point of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Where it is: x, y, z.
+    /// Its position: x, y, z.
     pub position: [f32; 3],
     /// Red, green, blue.
     pub colour: [u8; 3],
@@ -13,13 +13,13 @@ pub struct Point {
     pub confidence: u8,
 }
 
-/// The camera whose frame points have: x to its right, y down, z forward.
+/// The camera that defines the coordinates of points: x to its right, y down, z forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Frame {
     /// The left camera of the pair that was matched; the rectified one, if the pair has been rectified.
     #[default]
     Matched,
-    /// The left camera before rectification, as it really stands. It has the same centre.
+    /// The original left camera before rectification. It has the same centre.
     Original,
 }
 
@@ -28,14 +28,14 @@ pub enum Frame {
 pub struct Cloud {
     /// The points, row by row of the left image. Positions have the unit of the baseline.
     pub points: Vec<Point>,
-    /// What positions count from.
+    /// The frame of the positions.
     pub frame: Frame,
     /// The unit of positions.
     pub unit: Unit,
 }
 
 impl Cloud {
-    /// What a file says of positions: frame and unit, in one line.
+    /// Describes the positions in one line: frame and unit.
     #[must_use]
     pub fn about(&self) -> String {
         let unit = if self.unit == Unit::Unknown { "that of the baseline" } else { self.unit.name() };
@@ -47,7 +47,7 @@ impl Cloud {
     }
 }
 
-/// The bytes of a file: a header, and then each point as `record` writes it, in `size` bytes.
+/// Encodes a file: a header, then each point in `size` bytes, as `record` writes it.
 pub(super) fn encoded(
     header: String,
     cloud: &Cloud,
@@ -65,7 +65,7 @@ mod tests {
     use super::super::{pcd, ply};
     use super::*;
 
-    /// The words behind each line of a header that begins with `key`.
+    /// The words after `key` in each line of a header that begins with it.
     fn entries<'a>(header: &'a str, key: &str) -> Vec<&'a str> {
         header.lines().filter_map(|line| line.strip_prefix(key)).flat_map(str::split_whitespace).collect()
     }
