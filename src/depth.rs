@@ -8,7 +8,7 @@ use crate::calibration::cameras::{Pose, ThirdCamera};
 use crate::calibration::matrix::{Matrix, rotated, transposed};
 use crate::error::{Error, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
-use crate::image::cloud::{Cloud, Frame, Point};
+use crate::image::cloud::{Cloud, Point, PointFrame};
 use crate::image::{Image, Plane};
 use crate::maps::{FRACTION, Maps};
 use crate::registration;
@@ -23,7 +23,7 @@ pub struct Rig {
     /// The rotation from the rectified left camera to the original one, where they differ.
     to_original: Option<Matrix>,
     /// The frame of the points.
-    frame: Frame,
+    frame: PointFrame,
 }
 
 impl Rig {
@@ -47,7 +47,7 @@ impl Rig {
         if baseline <= 0.0 {
             return error(format!("baseline={baseline} is not above 0; give the distance of the cameras"));
         }
-        Ok(Self { camera, doffs, baseline, unit, to_original: None, frame: Frame::Matched })
+        Ok(Self { camera, doffs, baseline, unit, to_original: None, frame: PointFrame::Matched })
     }
 
     /// The same rig with the rotation of the original left camera, to which the pose of a third camera in
@@ -62,7 +62,7 @@ impl Rig {
     /// The same rig, with points in the frame of the original left camera. Depths stay along the axis of the rectified camera.
     #[must_use]
     pub fn in_original_frame(self, rectifying: &Matrix) -> Self {
-        Self { frame: Frame::Original, ..self.rectified_by(rectifying) }
+        Self { frame: PointFrame::Original, ..self.rectified_by(rectifying) }
     }
 
     /// The rig of a part of the images, whose first pixel is (x, y).
@@ -94,7 +94,7 @@ impl Rig {
     #[must_use]
     pub fn point(&self, x: f64, y: f64, d: f64) -> Option<[f64; 3]> {
         let point = self.matched(x, y, d)?;
-        Some(if self.frame == Frame::Original { self.original(point) } else { point })
+        Some(if self.frame == PointFrame::Original { self.original(point) } else { point })
     }
 
     /// [`Rig::point`] in the frame of the rectified left camera.
@@ -290,12 +290,12 @@ mod tests {
         let point = |position, red, confidence| Point { position, colour: [red, 10, 20], confidence };
         // The fifth pixel is at infinity.
         let expected = [point([-4.0, -4.0, 2000.0], 0, 200), point([15.0, -10.0, 5000.0], 5, 255)];
-        assert_eq!((&cloud.points[..], cloud.frame), (&expected[..], Frame::Matched));
+        assert_eq!((&cloud.points[..], cloud.frame), (&expected[..], PointFrame::Matched));
         // A quarter turn about the axis: right in the rectified camera is down in the original one.
         let turned = rig.in_original_frame(&[[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
         let cloud = turned.cloud(&maps, &left);
         let expected = [point([4.0, -4.0, 2000.0], 0, 200), point([10.0, 15.0, 5000.0], 5, 255)];
-        assert_eq!((&cloud.points[..], cloud.frame), (&expected[..], Frame::Original));
+        assert_eq!((&cloud.points[..], cloud.frame), (&expected[..], PointFrame::Original));
         assert_eq!(turned.depth(60.0), rig.depth(60.0));
     }
 

@@ -144,7 +144,7 @@ pub struct Reason {
 
 impl Reason {
     /// Describes an error of the system in other words.
-    pub fn of(error: io::Error, words: impl Into<String>) -> Self {
+    pub fn from_io(error: io::Error, words: impl Into<String>) -> Self {
         Self { text: words.into(), io: Some(error.into()), of_request: false }
     }
 
@@ -200,7 +200,7 @@ impl From<&str> for Reason {
 impl From<io::Error> for Reason {
     fn from(error: io::Error) -> Self {
         let text = in_words(&error);
-        Self::of(error, text)
+        Self::from_io(error, text)
     }
 }
 
@@ -534,7 +534,7 @@ impl Error {
     pub(crate) fn opening(path: &Path, error: io::Error) -> Self {
         match error.kind() {
             io::ErrorKind::NotFound => {
-                Self::read(path, Reason::of(error, "there is no such file; check the name"))
+                Self::read(path, Reason::from_io(error, "there is no such file; check the name"))
             }
             _ => Self::read(path, error),
         }
@@ -618,7 +618,7 @@ mod tests {
         for (error, kind) in [
             (Error::read("a", denied()), io::ErrorKind::PermissionDenied),
             (Error::write("a", denied()), io::ErrorKind::PermissionDenied),
-            (Error::write("a", Reason::of(denied(), "other words")), io::ErrorKind::PermissionDenied),
+            (Error::write("a", Reason::from_io(denied(), "other words")), io::ErrorKind::PermissionDenied),
             (crate::image::read::grey8(&missing).unwrap_err(), io::ErrorKind::NotFound),
             (crate::text::read(&missing, 1, "file").unwrap_err(), io::ErrorKind::NotFound),
             (crate::image::read::grey8(&below).unwrap_err(), io::ErrorKind::NotADirectory),

@@ -102,11 +102,11 @@ impl LevelGraph {
             });
             assert!(inside, "factor ({x}, {y}): member code {code} leads out of the image");
         }
-        Self::of_valid(width, height, neighbours, codes)
+        Self::from_valid(width, height, neighbours, codes)
     }
 
     /// Like [`Self::new`], without checking the codes.
-    fn of_valid(width: usize, height: usize, neighbours: usize, codes: Vec<u8>) -> Self {
+    fn from_valid(width: usize, height: usize, neighbours: usize, codes: Vec<u8>) -> Self {
         let step = |(dx, dy): (i32, i32)| dy as isize * width as isize + dx as isize;
         let steps = offsets().map(step).collect();
         let mut graph =
@@ -276,7 +276,7 @@ pub fn of_level(image: &Image, plan: &Plan) -> LevelGraph {
             },
         );
     }
-    LevelGraph::of_valid(width, height, neighbours, codes)
+    LevelGraph::from_valid(width, height, neighbours, codes)
 }
 
 /// Converts a plane, and pads its rows with `beyond`: [`RADIUS`] values at the start, and [`RADIUS`] +

@@ -133,7 +133,7 @@ pub use front::drift;
 pub use image::Pair;
 #[cfg(not(target_arch = "wasm32"))]
 pub use matcher::SharedMatcher;
-pub use matcher::{Answer, Builder, Found, Job, Matched, Matcher, Search, Timing};
+pub use matcher::{Answer, AutoRange, Builder, Job, Matched, Matcher, Search, Timing};
 pub use options::Method;
 pub use watch::Progress;
 

@@ -13,7 +13,7 @@ use crate::rectification::Doubt;
 
 /// A front end's names for its options; `None` for options that it does not have.
 #[derive(Clone, Copy, Debug)]
-pub struct Words {
+pub struct Vocabulary {
     /// The text before and after the name of a key of the method.
     pub key: [&'static str; 2],
     /// How to list the keys.
@@ -62,7 +62,7 @@ pub struct Words {
     pub crop: Option<&'static str>,
 }
 
-impl Words {
+impl Vocabulary {
     /// A front end with the names of the library and without the options that may be missing. Each front end
     /// sets its own `cpu`.
     pub const PLAIN: Self = Self {
@@ -94,7 +94,7 @@ impl Words {
 
 /// An error with its remedy.
 #[must_use]
-pub fn error(error: &Error, words: &Words) -> String {
+pub fn error(error: &Error, words: &Vocabulary) -> String {
     match error {
         Error::Option { key, cause } => format!("{}: {cause}{}", words.key(key), words.of_key(cause)),
         Error::Preset { .. } => format!("{}: {error}", words.preset),
@@ -111,7 +111,7 @@ pub fn error(error: &Error, words: &Words) -> String {
 
 /// A warning with its remedy.
 #[must_use]
-pub fn warning(warning: &Warning, Words { min, max, mask, orient, rectify, .. }: &Words) -> String {
+pub fn warning(warning: &Warning, Vocabulary { min, max, mask, orient, rectify, .. }: &Vocabulary) -> String {
     let remedy = match warning {
         Warning::Oriented { .. } => and(": turn them upright by ", *orient),
         Warning::NotRectified { .. } => and(": use ", *rectify),
@@ -128,7 +128,7 @@ pub fn warning(warning: &Warning, Words { min, max, mask, orient, rectify, .. }:
 
 /// Like [`warning`], for a pair that was rectified by a calibration or by its own matches: rectifying is no remedy any more.
 #[must_use]
-pub fn of_rectified(warning: &Warning, calibrated: bool, words: &Words) -> String {
+pub fn of_rectified(warning: &Warning, calibrated: bool, words: &Vocabulary) -> String {
     let Warning::NotRectified { offset } = warning else { return self::warning(warning, words) };
     let why = if calibrated {
         "the calibration is not of these cameras as they are now, or not of images of this size"
@@ -141,7 +141,7 @@ pub fn of_rectified(warning: &Warning, calibrated: bool, words: &Words) -> Strin
 
 /// A doubt about a rectification, or about the calibration of a rectified pair, with its remedy.
 #[must_use]
-pub fn doubt(doubt: &Doubt, Words { unit, crop, .. }: &Words) -> String {
+pub fn doubt(doubt: &Doubt, Vocabulary { unit, crop, .. }: &Vocabulary) -> String {
     let remedy = match doubt {
         Doubt::OtherSize { .. } => and("; if they show another part, say which by ", *crop),
         Doubt::Baseline { .. } => and(": ", *unit),
@@ -158,7 +158,7 @@ fn and(joint: &str, word: Option<&str>) -> String {
     word.map_or_else(String::new, |word| format!("{joint}{word}"))
 }
 
-impl Words {
+impl Vocabulary {
     fn key(&self, key: &str) -> String {
         let [before, after] = self.key;
         format!("{before}{key}{after}")

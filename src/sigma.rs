@@ -23,7 +23,7 @@ pub struct Sigma {
 impl Sigma {
     /// The model for the maps of `method`.
     #[must_use]
-    pub fn of(method: &Method) -> Self {
+    pub fn for_method(method: &Method) -> Self {
         match method.schedule.match_size {
             MatchSize::Full | MatchSize::Double => Self { floor: 0.2, at_zero: 2.6, halving: 15.0 },
             // Its confidence has smaller steps: after fewer iterations, the best label leads by less.
@@ -58,12 +58,12 @@ mod tests {
     #[test]
     fn it_falls_to_its_floor() {
         for method in [Method::default(), Method::accurate(), Method::fast()] {
-            let sigma = Sigma::of(&method);
+            let sigma = Sigma::for_method(&method);
             let all: Vec<f32> = (0..=u8::MAX).map(|confidence| sigma.at(confidence)).collect();
             assert!(all.is_sorted_by(|a, b| a >= b));
             assert!(f64::from(all[0]) > sigma.at_zero && f64::from(all[255]) < sigma.floor + 1e-6);
         }
-        assert!(Sigma::of(&Method::fast()).at(20) < Sigma::of(&Method::default()).at(20));
+        assert!(Sigma::for_method(&Method::fast()).at(20) < Sigma::for_method(&Method::default()).at(20));
     }
 
     #[test]
@@ -79,7 +79,7 @@ mod tests {
         let disparity = Plane::new(5, 1, vec![0; 5]);
         let confidence = row(&[60, 10, 0, 0, 60]);
         let maps = Maps { raw: disparity.clone(), disparity, confidence, validity, right: None };
-        let sigma = Sigma::of(&Method::default());
+        let sigma = Sigma::for_method(&Method::default());
         let none = f32::INFINITY;
         assert_eq!(sigma.map(&maps).data(), [sigma.at(60), sigma.at(10), none, none, none]);
     }

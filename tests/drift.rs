@@ -1,4 +1,4 @@
-//! Rigs whose right camera has turned since they were calibrated: how far, found in their frames, and taken back.
+//! Drift of the right camera since calibration: it is measured in frames and corrected.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -20,7 +20,7 @@ use raw::{CAMERAS, Camera};
 const SIZE: (usize, usize) = (640, 480);
 const RANGE: DisparityRange = DisparityRange { min: 0, max: 90 };
 
-/// What the rig sees, one after the other.
+/// The scenes that the rig sees, in sequence.
 static SCENES: LazyLock<Vec<scenes::Scene>> = LazyLock::new(|| {
     ["mixed", "slanted"].map(|name| scenes::render(name, 2 * SIZE.0, 2 * SIZE.1, 161)).into()
 });

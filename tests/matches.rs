@@ -7,7 +7,7 @@ use mrfgs::error::{Error, RangeError};
 use mrfgs::image::{Image, Pair, Plane, Rect, calib::Calibration, pfm, read};
 use mrfgs::low_level::front::check::{self, Warning};
 use mrfgs::low_level::front::label_range::{self, LabelRanges, MIN_MATCHES};
-use mrfgs::low_level::front::matches::{self, Match};
+use mrfgs::low_level::front::matches::{self, SparseMatch};
 use mrfgs::maps::FRACTION;
 use mrfgs::options::DisparityRange;
 use std::io::Write;
@@ -45,7 +45,7 @@ impl Case {
 
     /// Pixels per match, and the percentage of matches that are wrong by more than 1.5 px, among those that
     /// both views see.
-    fn accuracy(&self, found: &[Match]) -> (usize, f64) {
+    fn accuracy(&self, found: &[SparseMatch]) -> (usize, f64) {
         let errors: Vec<f32> = found
             .iter()
             .filter(|m| self.visible[(m.x, m.y)] == 255)
@@ -118,7 +118,7 @@ fn matches_of_real_pairs_are_right() {
 fn disparities_lie_between_the_pixels() {
     let case = Case::scene("slanted");
     let found = matches::find(&case.pair, None, Some(case.range));
-    let mean = |disparity: fn(&Match) -> i32| {
+    let mean = |disparity: fn(&SparseMatch) -> i32| {
         let errors = found.iter().map(|m| {
             let error = disparity(m) as f32 / FRACTION as f32 - case.truth[(m.x, m.y)];
             error.abs().min(1.5)
@@ -216,7 +216,7 @@ fn masked_pixels_are_never_used() {
     let clean = found(0);
     assert_eq!(clean, found(0xffff));
     assert!(clean.len() > 200);
-    let near = |m: &Match| (57..103).contains(&m.x) && (47..113).contains(&m.y);
+    let near = |m: &SparseMatch| (57..103).contains(&m.x) && (47..113).contains(&m.y);
     assert!(!clean.iter().any(near));
     assert!(matches::find(&case.pair, None, Some(case.range)).iter().any(near));
 }
@@ -274,8 +274,8 @@ fn not_found(pair: &Pair) {
 }
 
 /// Matches at (0, 0), (1, 0) and so on.
-fn matches_of(disparities: &[i32]) -> Vec<Match> {
-    let at = |(x, &disparity): (usize, &i32)| Match { x, y: 0, disparity, dy: 0, score: 1.0 };
+fn matches_of(disparities: &[i32]) -> Vec<SparseMatch> {
+    let at = |(x, &disparity): (usize, &i32)| SparseMatch { x, y: 0, disparity, dy: 0, score: 1.0 };
     disparities.iter().enumerate().map(at).collect()
 }
 
@@ -285,7 +285,7 @@ fn supports_are_mu_and_k_sigma() {
     // Ten matches of mean 5.5 px and sigma 1.5 px in zone 0, none in zone 1, and one pixel without a zone.
     let found = matches_of(&[4, 7, 4, 7, 4, 7, 4, 7, 4, 7].map(|d| d * FRACTION));
     let zones = Plane::new(12, 1, vec![0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 7]);
-    let interval = |k: f64, found: &[Match]| -> (i32, i32) {
+    let interval = |k: f64, found: &[SparseMatch]| -> (i32, i32) {
         let label_range = label_range::zonal(range, (&zones, 2), found, k);
         for x in [10, 11] {
             assert_eq!(label_range[(x, 0)], [-4, 20]);

@@ -10,7 +10,7 @@ use mrfgs::low_level::engine::Inspection;
 use mrfgs::low_level::front::check::{self, Part, Warning};
 use mrfgs::maps::{FRACTION, Maps};
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::{Found, Matched, Matcher};
+use mrfgs::{AutoRange, Matched, Matcher};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -208,14 +208,14 @@ fn a_range_that_was_found_becomes_wider() {
     for method in [Method::default(), Method::fast()] {
         let mut matcher = Matcher::builder().method(method).device("cpu").build().unwrap();
         let cut = DisparityRange::new(0, 25).unwrap();
-        let again = matcher.run(&case.pair, Found(cut)).unwrap();
+        let again = matcher.run(&case.pair, AutoRange(cut)).unwrap();
         assert_eq!((again.range().min, again.range().max, again.range_found), (0, 38, true));
         let wider = matcher.run(&case.pair, 0..=38).unwrap();
         assert!(again.maps == wider.maps && !wider.range_found);
         let given = matcher.run(&case.pair, cut).unwrap();
         assert!(given.range() == cut && !given.warnings().is_empty());
         // A range that holds the scene stays, and so does one beyond which nothing is found.
-        let enough = matcher.run(&case.pair, Found(case.range)).unwrap();
+        let enough = matcher.run(&case.pair, AutoRange(case.range)).unwrap();
         assert_eq!(enough.range(), case.range);
         // The lower end of a range that was found does not count: what is far away has matches.
         let high = DisparityRange::new(22, 47).unwrap();
@@ -223,10 +223,10 @@ fn a_range_that_was_found_becomes_wider() {
             found.warnings().iter().any(|w| matches!(w, Warning::Clipped { upper: false, .. }))
         };
         assert!(lower(&matcher.run(&case.pair, high).unwrap()));
-        assert!(!lower(&matcher.run(&case.pair, Found(high)).unwrap()));
+        assert!(!lower(&matcher.run(&case.pair, AutoRange(high)).unwrap()));
         // Who looks in sees one match.
         let mut prepared = 0;
-        let job = matcher.job(&case.pair, Found(cut)).inspect(|seen| {
+        let job = matcher.job(&case.pair, AutoRange(cut)).inspect(|seen| {
             prepared += usize::from(matches!(seen, Inspection::Prepared(_)));
             Ok(())
         });

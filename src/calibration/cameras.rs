@@ -15,7 +15,7 @@ pub struct StereoCalibration {
     /// The pose of the right camera relative to the left one.
     pub pose: Option<Pose>,
     /// The calibration of the rectified images, where the file has one.
-    pub views: Option<Views>,
+    pub views: Option<RectifiedViews>,
     /// Width and height of the images, in pixels.
     pub size: Option<(usize, usize)>,
     /// Width and height of the right images, where they differ from those of the left ones.
@@ -42,7 +42,7 @@ pub struct Pose {
 
 /// A rectification: two pinhole cameras at the positions of the real ones that look in the same direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Views {
+pub struct RectifiedViews {
     /// The rotations from each real camera to its rectified view (R1 and R2).
     pub rotations: [Matrix; 2],
     /// The rectified cameras.
@@ -94,7 +94,7 @@ impl Pose {
     }
 }
 
-impl Views {
+impl RectifiedViews {
     /// The views of a rectified pair: two cameras like `camera`, `baseline` apart.
     pub(super) fn of_rectified(camera: Camera, baseline: f64) -> Self {
         Self { rotations: [IDENTITY; 2], cameras: [camera; 2], translation: [-baseline, 0.0], size: None }
@@ -253,9 +253,11 @@ impl StereoCalibration {
         let lens = |lenses: [Lens; 2], i: usize| fits[i].map_or(lenses[i], |fit| lenses[i].in_size(&fit));
         let views = self.views.map(|views| match fits[0] {
             // Views with a size of their own stay as they are.
-            Some(fit) if views.size.is_none_or(|size| Some(size) == self.size) => {
-                Views { cameras: views.cameras.map(|camera| camera.in_size(&fit)), size: None, ..views }
-            }
+            Some(fit) if views.size.is_none_or(|size| Some(size) == self.size) => RectifiedViews {
+                cameras: views.cameras.map(|camera| camera.in_size(&fit)),
+                size: None,
+                ..views
+            },
             _ => views,
         });
         let size = |i: usize| fits[i].map(|fit| fit.size).or(self.sizes().map(|sizes| sizes[i]));
@@ -283,7 +285,7 @@ impl StereoCalibration {
     /// else scaled as in [`Calibration::of_size`]. `None` if the file has no rectification.
     ///
     /// # Errors
-    /// Those of [`Views::calibration`], and [`Error::Calibration`] when it is for several sizes but not for this one.
+    /// Those of [`RectifiedViews::calibration`], and [`Error::Calibration`] when it is for several sizes but not for this one.
     pub fn of_rectified_images(&self, size: Option<(usize, usize)>) -> Result<Option<Calibration>> {
         let in_size = |of: Calibration| size.map_or_else(|| of.clone(), |size| of.of_size(size));
         if let Some(benchmark) = &self.benchmark {
@@ -312,7 +314,7 @@ impl StereoCalibration {
     /// Derives the pose from the rectification, in files without a pose.
     pub(super) fn with_pose_of_views(mut self) -> Self {
         self.pose = self.pose.or_else(|| {
-            let Views { rotations: [left, right], translation: [x, y], .. } = self.views?;
+            let RectifiedViews { rotations: [left, right], translation: [x, y], .. } = self.views?;
             // A point goes to the left view, along the baseline to the right one, and back to the right
             // camera.
             let back = transposed(&right);

@@ -1,6 +1,6 @@
 //! The `camera.json` of Cityscapes, for a rectified pair.
 
-use super::cameras::{StereoCalibration, Views};
+use super::cameras::{RectifiedViews, StereoCalibration};
 use super::node::Entries;
 use crate::error::Result;
 use crate::image::calib::{Camera, Unit};
@@ -22,6 +22,6 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
         focal_length: [above_0("fx")?, above_0("fy")?],
         principal_point: [intrinsic.number("u0", "u0")?, intrinsic.number("v0", "v0")?],
     };
-    let views = Views::of_rectified(camera, extrinsic.above_0("baseline", "baseline")?);
+    let views = RectifiedViews::of_rectified(camera, extrinsic.above_0("baseline", "baseline")?);
     Ok(StereoCalibration { views: Some(views), unit: Unit::Metre, ..StereoCalibration::default() })
 }

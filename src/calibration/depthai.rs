@@ -14,7 +14,7 @@ pub(super) fn is(entries: &Entries) -> bool {
 }
 
 pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
-    let sockets = Sockets::of(entries)?;
+    let sockets = Sockets::read(entries)?;
     let left = posed(camera(&sockets.cameras, sockets.left)?, Pose::IN_PLACE)?;
     let right = posed(camera(&sockets.cameras, sockets.right)?, sockets.pose_of(sockets.right)?)?;
     // OAK cameras crop images of another aspect ratio.
@@ -23,7 +23,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
 
 /// The camera beside the pair, usually the colour camera.
 pub(super) fn third(entries: &Entries) -> Result<ThirdCamera> {
-    let sockets = Sockets::of(entries)?;
+    let sockets = Sockets::read(entries)?;
     let mut others = Vec::new();
     for item in sockets.cameras.items()? {
         let socket = item.items()?.first().map(Entry::number).transpose()?;
@@ -52,7 +52,7 @@ struct Sockets<'a> {
 }
 
 impl<'a> Sockets<'a> {
-    fn of(entries: &Entries<'a>) -> Result<Self> {
+    fn read(entries: &Entries<'a>) -> Result<Self> {
         let expected = "the sockets of the left and the right camera";
         let stereo = entries.require("stereorectificationdata", "stereoRectificationData", expected)?;
         let sockets = stereo.group()?;

@@ -1,7 +1,7 @@
 //! KITTI's calibrations: `P0` to `P3` of its odometry, and `calib_cam_to_cam.txt`, which also has the lenses.
 //! `DrivingStereo` uses the same entries with cameras 101 and 103.
 
-use super::cameras::{Pose, StereoCalibration, Views};
+use super::cameras::{Pose, RectifiedViews, StereoCalibration};
 use super::lens::Lens;
 use super::matrix::{IDENTITY, length};
 use super::node::{Entries, Entry};
@@ -39,7 +39,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
         return Err(differs(entries, "srect", cameras));
     }
     let mut calibration = StereoCalibration { unit: Unit::Metre, ..StereoCalibration::default() };
-    calibration.views = Some(Views { size, ..views(entries, cameras)? });
+    calibration.views = Some(RectifiedViews { size, ..views(entries, cameras)? });
     let [left, right] = cameras;
     if entries.find(&of_camera("k", left)).is_some() {
         calibration.lenses = Some([lens(entries, left)?, lens(entries, right)?]);
@@ -91,7 +91,7 @@ fn differs(entries: &Entries, stem: &str, [left, right]: [usize; 2]) -> Error {
     }
 }
 
-fn views(entries: &Entries, cameras: [usize; 2]) -> Result<Views> {
+fn views(entries: &Entries, cameras: [usize; 2]) -> Result<RectifiedViews> {
     let mut rotations = [IDENTITY; 2];
     let mut projections = Vec::new();
     for (rotation, camera) in rotations.iter_mut().zip(cameras) {

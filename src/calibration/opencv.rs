@@ -1,6 +1,6 @@
 //! OpenCV's stereo calibrations in YAML or XML, by the names that it and most other programs use.
 
-use super::cameras::{Pose, StereoCalibration, Views};
+use super::cameras::{Pose, RectifiedViews, StereoCalibration};
 use super::lens::{Distortion, Lens, RadialTangential};
 use super::matrix::{IDENTITY, Matrix, length, rotation};
 use super::models::Model;
@@ -125,7 +125,7 @@ fn check_baseline(entries: &Entries, calibration: &StereoCalibration) -> Result<
     if let Some(pose) = &calibration.pose {
         put(TRANSLATION, length(pose.translation));
     }
-    if let Some(Views { translation: [x, y], .. }) = calibration.views {
+    if let Some(RectifiedViews { translation: [x, y], .. }) = calibration.views {
         put(PROJECTION[1], length([x, y, 0.0]));
     }
     if let Some(entry) = entries.find(Q) {
@@ -288,7 +288,7 @@ pub(super) fn pose(entries: &Entries) -> Result<Pose> {
     Ok(Pose { rotation, translation })
 }
 
-fn views(entries: &Entries) -> Result<Views> {
+fn views(entries: &Entries) -> Result<RectifiedViews> {
     let mut rotations = [IDENTITY; 2];
     let mut projections = Vec::new();
     for (view, rotation) in rotations.iter_mut().enumerate() {
@@ -302,7 +302,7 @@ fn views(entries: &Entries) -> Result<Views> {
     }
     let entry = entries.require(PROJECTION[1], "P2", "")?;
     let size = entries.find(NEW_SIZE).map(|entry| entry.size()).transpose()?;
-    Ok(Views { size, ..rectified(&entry, rotations, [projections[0], projections[1]])? })
+    Ok(RectifiedViews { size, ..rectified(&entry, rotations, [projections[0], projections[1]])? })
 }
 
 /// A rectified camera.
@@ -329,7 +329,7 @@ pub(super) fn rectified(
     entry: &Entry,
     rotations: [Matrix; 2],
     [left, right]: [Projection; 2],
-) -> Result<Views> {
+) -> Result<RectifiedViews> {
     let [a, b] = [left.camera, right.camera];
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-3 * (1.0 + a.abs());
     let translation: [f64; 2] = std::array::from_fn(|i| right.offset[i] - left.offset[i]);
@@ -343,5 +343,5 @@ pub(super) fn rectified(
     if translation.iter().all(|v| *v == 0.0) {
         return Err(entry.wrong("focal length times baseline in its fourth column"));
     }
-    Ok(Views { rotations, cameras: [a, b], translation, size: None })
+    Ok(RectifiedViews { rotations, cameras: [a, b], translation, size: None })
 }

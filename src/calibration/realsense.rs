@@ -1,7 +1,7 @@
 //! The calibration of RealSense cameras, saved as JSON by their viewer: that of the rectified views, at each
 //! image size.
 
-use super::cameras::{StereoCalibration, Views};
+use super::cameras::{RectifiedViews, StereoCalibration};
 use super::node::Entries;
 use crate::error::Result;
 use crate::image::calib::{Camera, Unit};
@@ -36,7 +36,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
             principal_point: [number("ppx")?, number("ppy")?],
         };
         sizes.push(StereoCalibration {
-            views: Some(Views::of_rectified(camera, baseline)),
+            views: Some(RectifiedViews::of_rectified(camera, baseline)),
             size: Some((width.count()?, height.count()?)),
             unit: Unit::Millimetre,
             ..StereoCalibration::default()

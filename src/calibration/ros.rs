@@ -67,7 +67,7 @@ struct Region {
 impl Region {
     /// From `roi`, `binning_x` and `binning_y`, for a `sensor` of this size. 0 means all of it, and every
     /// pixel.
-    fn of(entries: &Entries, sensor: (usize, usize)) -> Result<Self> {
+    fn read(entries: &Entries, sensor: (usize, usize)) -> Result<Self> {
         let count = |of: &Entries, names: &str| Ok::<_, Error>(of.number_or_zero(names)? as usize);
         let binning = [count(entries, "binningx")?.max(1), count(entries, "binningy")?.max(1)];
         let mut region = Self { offset: [0.0; 2], size: sensor, binning };
@@ -124,7 +124,7 @@ fn info(entries: &Entries) -> Result<Info> {
     let distortion = opencv::distortion(&entry, "the coefficients of the distortion", fisheye)?;
     let count = |names: &str, called| entries.require(names, called, "a number of pixels")?.count();
     let size = (count("imagewidth width", "image_width")?, count("imageheight height", "image_height")?);
-    let region = Region::of(entries, size)?;
+    let region = Region::read(entries, size)?;
     let camera = region.camera(Camera { focal_length, principal_point });
     let lens = Lens::new(camera.focal_length, camera.principal_point, distortion);
     let rotation = entries.require(RECTIFICATION, "rectification_matrix", "a rotation of 3 x 3")?;

@@ -64,7 +64,7 @@ pub async fn solve(
     observer: Observer<'_>,
     inspector: Option<Inspector<'_>>,
 ) -> Result<Solution> {
-    let mut started = Match::new(backend, program, inspector.is_some());
+    let mut started = MatchRun::new(backend, program, inspector.is_some());
     started.advance(backend, pair, observer, inspector, None).await?;
     Ok(started.solution())
 }
@@ -79,8 +79,8 @@ pub async fn start(
     program: &Program,
     pair: &Pair,
     observer: Observer<'_>,
-) -> Result<Match> {
-    let mut started = Match::new(backend, program, false);
+) -> Result<MatchRun> {
+    let mut started = MatchRun::new(backend, program, false);
     started.advance(backend, pair, observer, None, Some(Step::Collect)).await?;
     Ok(started)
 }
@@ -89,14 +89,14 @@ pub async fn start(
 ///
 /// # Errors
 /// The errors of the backend.
-pub async fn finish(backend: &mut dyn Backend, mut started: Match, pair: &Pair) -> Result<Solution> {
+pub async fn finish(backend: &mut dyn Backend, mut started: MatchRun, pair: &Pair) -> Result<Solution> {
     let quiet = &mut |_: Progress| ControlFlow::Continue(());
     started.advance(backend, pair, quiet, None, None).await?;
     Ok(started.solution())
 }
 
 /// A match that is running through its steps.
-pub struct Match {
+pub struct MatchRun {
     program: Program,
     /// The next step.
     next: usize,
@@ -136,7 +136,7 @@ struct Partial {
     cells: Vec<u64>,
 }
 
-impl Match {
+impl MatchRun {
     fn new(backend: &mut dyn Backend, program: &Program, inspected: bool) -> Self {
         // An inspected match runs the unfused program, so that the inspector sees complete levels.
         let program = if inspected { program.clone() } else { backend.fit(program.clone()) };

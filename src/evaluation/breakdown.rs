@@ -61,7 +61,7 @@ impl Class {
 
 /// The errors of one class. A pixel is bad as in `bad2.0`: wrong by more than 2 px, or invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Part {
+pub struct ClassErrors {
     /// Share of all pixels with known truth, in percent; over all classes these add up to 100.
     pub share: f64,
     /// Share of the class's pixels that are bad, in percent; `None` when it has none.
@@ -82,7 +82,7 @@ pub struct Part {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Breakdown {
     /// In the order of [`Class::ALL`].
-    pub parts: [Part; 6],
+    pub parts: [ClassErrors; 6],
 }
 
 impl Serialize for Breakdown {
@@ -93,7 +93,7 @@ impl Serialize for Breakdown {
 
 impl Breakdown {
     /// Every class with its errors.
-    pub fn iter(&self) -> impl Iterator<Item = (Class, &Part)> {
+    pub fn iter(&self) -> impl Iterator<Item = (Class, &ClassErrors)> {
         Class::ALL.into_iter().zip(&self.parts)
     }
 
@@ -108,8 +108,9 @@ impl Breakdown {
             return None;
         }
         let parts = std::array::from_fn(|i| {
-            let every = |field: fn(&Part) -> Option<f64>| average(all.iter().map(|b| field(&b.parts[i])));
-            Part {
+            let every =
+                |field: fn(&ClassErrors) -> Option<f64>| average(all.iter().map(|b| field(&b.parts[i])));
+            ClassErrors {
                 share: every(|p| Some(p.share)).unwrap_or(0.0),
                 bad: every(|p| p.bad),
                 avg: every(|p| p.avg),
@@ -190,7 +191,7 @@ impl GroundTruth {
         if pixels == 0.0 {
             return Err(nothing_known());
         }
-        let parts = tallies.map(|t| Part {
+        let parts = tallies.map(|t| ClassErrors {
             share: 100.0 * t.pixels as f64 / pixels,
             bad: percent(t.bad as f64, t.pixels as f64),
             avg: (t.valid > 0).then(|| t.errors.value() / t.valid as f64),

@@ -1,7 +1,7 @@
 //! Warnings about probable mistakes. Before a pair is matched they come from its pixels and from sparse
 //! matches, which also suggest the range to search; after a match they come from its maps.
 
-use super::matches::{self, Match, Survey};
+use super::matches::{self, SparseMatch, Survey};
 use super::parts;
 pub use super::parts::Part;
 use crate::error::{RangeError, Result};
@@ -120,7 +120,7 @@ fn range_from(pair: &Pair, least: Option<f64>) -> Result<DisparityRange> {
 /// The range of the matches of `pair`, from `least` on; `None` if there are too few.
 fn range_by_matches(pair: &Pair, least: Option<f64>) -> Option<Result<DisparityRange>> {
     let mut found = matches::find(pair, None, None);
-    let in_front = |m: &Match, least: f64| f64::from(m.disparity) >= least * f64::from(FRACTION);
+    let in_front = |m: &SparseMatch, least: f64| f64::from(m.disparity) >= least * f64::from(FRACTION);
     let least = least.filter(|least| 2 * found.iter().filter(|m| in_front(m, *least)).count() > found.len());
     if let Some(least) = least {
         found.retain(|m| in_front(m, least));
@@ -149,8 +149,8 @@ fn range_by_matches(pair: &Pair, least: Option<f64>) -> Option<Result<DisparityR
 }
 
 /// The sorted disparities of `found` without outliers, in an image of this size.
-fn without_outliers(found: &[Match], size: (usize, usize)) -> Vec<i32> {
-    let sorted = |found: &mut dyn Iterator<Item = &Match>| {
+fn without_outliers(found: &[SparseMatch], size: (usize, usize)) -> Vec<i32> {
+    let sorted = |found: &mut dyn Iterator<Item = &SparseMatch>| {
         let mut disparities: Vec<i32> = found.map(|m| m.disparity).collect();
         disparities.sort_unstable();
         disparities
@@ -165,9 +165,9 @@ fn without_outliers(found: &[Match], size: (usize, usize)) -> Vec<i32> {
 
 /// Whether fewer than two other matches near `one` have a similar disparity: each part of a surface has
 /// several.
-fn is_alone(one: &Match, all: &[Match], (width, height): (usize, usize)) -> bool {
+fn is_alone(one: &SparseMatch, all: &[SparseMatch], (width, height): (usize, usize)) -> bool {
     let reach = width.max(height) / PARTS;
-    let beside = |m: &&Match| {
+    let beside = |m: &&SparseMatch| {
         let apart = one.x.abs_diff(m.x).max(one.y.abs_diff(m.y));
         // Steeper surfaces are hardly seen by both cameras.
         let close = 4 * FRACTION + apart as i32 * FRACTION / 4;
@@ -426,7 +426,7 @@ fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
         return out;
     }
     // The median of |dy|; `None` if there are too few matches.
-    let offset = |found: &[Match]| {
+    let offset = |found: &[SparseMatch]| {
         let offset = || matches::median(found.iter().map(|m| m.dy.abs())).unsigned_abs();
         (found.len() >= MIN_MATCHES).then(offset)
     };
@@ -628,7 +628,7 @@ mod tests {
 
     #[test]
     fn outliers_do_not_count() {
-        let at = |x: usize, d: i32| Match { x, y: 50, disparity: d * FRACTION, dy: 0, score: 1.0 };
+        let at = |x: usize, d: i32| SparseMatch { x, y: 50, disparity: d * FRACTION, dy: 0, score: 1.0 };
         // A surface at 10 to 49, and an object in front of it whose matches support each other.
         let mut found: Vec<_> = (0..400).map(|x| at(x, 10 + x as i32 / 10)).collect();
         found.extend([at(200, 120), at(205, 121), at(212, 122)]);

@@ -201,7 +201,7 @@ impl Drift {
         let pair = turned.as_ref().unwrap_or(small);
         let found = matches::search(pair, None, Some(range), width * height / CORNERS, ROWS);
         let back = transposed(by);
-        let sight = |m: &matches::Match| {
+        let sight = |m: &matches::SparseMatch| {
             let [disparity, dy] = [m.disparity, m.dy].map(|v| f64::from(v) / f64::from(FRACTION));
             let at = |x: f64, y: f64, camera: &Camera| {
                 let ([fx, fy], [cx, cy]) = (camera.focal_length, camera.principal_point);
@@ -258,11 +258,11 @@ impl Drift {
             return None;
         }
         let mut by = IDENTITY;
-        let mut fit = Fit::of(&sights, &by)?;
+        let mut fit = Fit::at(&sights, &by)?;
         for _ in 0..STEPS {
             let step = solved(fit.normal, fit.right)?;
             by = product(&rotation(step), &by);
-            fit = Fit::of(&sights, &by)?;
+            fit = Fit::at(&sights, &by)?;
         }
         let axis = rotation_vector(&by);
         // More frames of a static scene do not improve the estimate.
@@ -293,7 +293,7 @@ struct Fit {
 
 impl Fit {
     /// The equations at the rotation `by`.
-    fn of(sights: &[&Sight], by: &Matrix) -> Option<Self> {
+    fn at(sights: &[&Sight], by: &Matrix) -> Option<Self> {
         let turned: Vec<(f64, [f64; 3])> = sights
             .iter()
             .map(|sight| {

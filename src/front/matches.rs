@@ -48,7 +48,7 @@ const SLOPE: i64 = 8;
 
 /// A pixel of the left view with its disparity.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Match {
+pub struct SparseMatch {
     /// Column in the left view, in pixels.
     pub x: usize,
     /// Row in the left view, in pixels.
@@ -72,7 +72,11 @@ pub struct Match {
 /// # Panics
 /// When the map of zones differs in size from the images.
 #[must_use]
-pub fn find(pair: &Pair, zones: Option<(&Plane<u32>, usize)>, range: Option<DisparityRange>) -> Vec<Match> {
+pub fn find(
+    pair: &Pair,
+    zones: Option<(&Plane<u32>, usize)>,
+    range: Option<DisparityRange>,
+) -> Vec<SparseMatch> {
     let (width, height) = pair.size();
     let spacing = if range.is_some() { SPACING } else { width * height / OVERVIEW };
     search(pair, zones, range, spacing, 0)
@@ -107,7 +111,7 @@ pub(super) struct Survey {
     /// The corners that were searched, in raster order.
     pub(super) corners: Vec<Corner>,
     /// The matches that were found.
-    pub(super) matches: Vec<Match>,
+    pub(super) matches: Vec<SparseMatch>,
 }
 
 /// [`find`] with one corner per `spacing` pixels ([`SPACING`] at least), on up to `rows` rows above and below
@@ -118,7 +122,7 @@ pub(super) fn search(
     range: Option<DisparityRange>,
     spacing: usize,
     rows: usize,
-) -> Vec<Match> {
+) -> Vec<SparseMatch> {
     survey(pair, zones, range, spacing, rows).matches
 }
 
@@ -150,7 +154,7 @@ fn surveyed(
             let there = peak(&left, (x, y), &right, x as i32 - max..=x as i32 - min, rows)?;
             let (rx, ry) = (there.x as i32, there.y as i32);
             let back = peak(&right, (there.x, there.y), &left, rx + min..=rx + max, rows)?;
-            (back.x.abs_diff(x) <= 1 && back.y.abs_diff(y) <= 1).then(|| Match {
+            (back.x.abs_diff(x) <= 1 && back.y.abs_diff(y) <= 1).then(|| SparseMatch {
                 x,
                 y,
                 disparity: (x as i32 - rx) * FRACTION - there.right,
@@ -247,12 +251,12 @@ pub(super) fn median(values: impl Iterator<Item = i32>) -> i32 {
 }
 
 /// The matches that agree with others around them, in their own and the adjacent cells (of `side` pixels).
-fn consistent(matches: Vec<Match>, side: usize) -> Vec<Match> {
-    let mut cells = BTreeMap::<(usize, usize), Vec<&Match>>::new();
+fn consistent(matches: Vec<SparseMatch>, side: usize) -> Vec<SparseMatch> {
+    let mut cells = BTreeMap::<(usize, usize), Vec<&SparseMatch>>::new();
     for m in &matches {
         cells.entry((m.x / side, m.y / side)).or_default().push(m);
     }
-    let agrees = |m: &Match| {
+    let agrees = |m: &SparseMatch| {
         let (i, j) = (m.x / side, m.y / side);
         let mut around: Vec<_> = (j.saturating_sub(1)..=j + 1)
             .flat_map(|j| (i.saturating_sub(1)..=i + 1).map(move |i| (i, j)))

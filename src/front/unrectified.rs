@@ -1,6 +1,6 @@
 //! Rectifies a pair by its own matches: from a coarse search of the whole image to a fine one along rows.
 
-use super::matches::{self, Match};
+use super::matches::{self, SparseMatch};
 use crate::error::{Error, RectificationError, Result};
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
@@ -103,7 +103,7 @@ fn search(
 ) -> Result<Vec<Correspondence>> {
     let (width, height) = by.size();
     let found = matches::search(&by.apply(pair)?, None, range, width * height / corners, rows);
-    let ends = |m: &Match| {
+    let ends = |m: &SparseMatch| {
         let [right, down] = [-m.disparity, m.dy].map(|v| f64::from(v) / f64::from(FRACTION));
         let (x, y) = (m.x as f64, m.y as f64);
         Some([by.left(x, y)?, by.right(x + right, y + down)?])

@@ -32,7 +32,7 @@ pub(super) fn decode_both(
         let cut = || damaged("a view is missing");
         return Ok(([left.ok_or_else(cut)??, right.ok_or_else(cut)??], true));
     }
-    let Some(halves) = Halves::of(path, bytes)? else {
+    let Some(halves) = Halves::find(path, bytes)? else {
         return Err(
             "holds one view; give the file of the right view too (files with both are .mpo and .jps)".into(),
         );
@@ -60,7 +60,7 @@ struct Halves {
 
 impl Halves {
     /// The layout from the file, or from its name: by default, a `.jps` is for cross-eyed viewing.
-    fn of(path: &Path, bytes: &[u8]) -> Result<Option<Self>, ReadError> {
+    fn find(path: &Path, bytes: &[u8]) -> Result<Option<Self>, ReadError> {
         let said = jpeg::segments(bytes)
             .find(|(marker, body)| *marker == 0xe3 && bytes[body.clone()].starts_with(JPS));
         let Some((_, body)) = said else {

@@ -15,7 +15,7 @@ pub struct Point {
 
 /// The camera that defines the coordinates of points: x to its right, y down, z forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Frame {
+pub enum PointFrame {
     /// The left camera of the pair that was matched; the rectified one, if the pair has been rectified.
     #[default]
     Matched,
@@ -29,7 +29,7 @@ pub struct Cloud {
     /// The points, row by row of the left image. Positions have the unit of the baseline.
     pub points: Vec<Point>,
     /// The frame of the positions.
-    pub frame: Frame,
+    pub frame: PointFrame,
     /// The unit of positions.
     pub unit: Unit,
 }
@@ -40,8 +40,8 @@ impl Cloud {
     pub fn about(&self) -> String {
         let unit = if self.unit == Unit::Unknown { "that of the baseline" } else { self.unit.name() };
         let camera = match self.frame {
-            Frame::Matched => "the left camera",
-            Frame::Original => "the original left camera, before rectification",
+            PointFrame::Matched => "the left camera",
+            PointFrame::Original => "the original left camera, before rectification",
         };
         format!("frame of {camera}: x right, y down, z forward; unit {unit}")
     }
@@ -76,7 +76,7 @@ mod tests {
         let other = Point { position: [0.0; 3], colour: [0; 3], confidence: 0 };
         let confidence = 200.0_f32.to_le_bytes();
         let position = [1.5_f32, -2.0, 1e6].map(f32::to_le_bytes).concat();
-        for frame in [Frame::Matched, Frame::Original] {
+        for frame in [PointFrame::Matched, PointFrame::Original] {
             let cloud = Cloud { points: vec![point, other], frame, unit: Unit::Metre };
             let split = |bytes: Vec<u8>, end: &str| {
                 let start =
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn the_frame_is_that_of_a_camera() {
         let about = |frame| Cloud { frame, ..Cloud::default() }.about();
-        assert!(about(Frame::Matched).starts_with("frame of the left camera: x right, y down"));
-        assert!(about(Frame::Original).starts_with("frame of the original left camera, before"));
+        assert!(about(PointFrame::Matched).starts_with("frame of the left camera: x right, y down"));
+        assert!(about(PointFrame::Original).starts_with("frame of the original left camera, before"));
     }
 }

@@ -20,7 +20,7 @@ const MAX_PLAIN_PIXELS_PER_BYTE: u64 = 8;
 
 /// The bytes of a file that begins like an image and is not too large for an image of `max_pixels` pixels.
 pub(super) fn load(path: &Path, max_pixels: u64) -> Result<Vec<u8>> {
-    file::load(path, max_pixels, |bytes| Kind::of(bytes).is_none().then(|| unknown(bytes)))
+    file::load(path, max_pixels, |bytes| Kind::detect(bytes).is_none().then(|| unknown(bytes)))
 }
 
 /// The kind of a file.
@@ -34,7 +34,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    pub(super) fn of(bytes: &[u8]) -> Option<Self> {
+    pub(super) fn detect(bytes: &[u8]) -> Option<Self> {
         if pfm::is_pfm(bytes) {
             return Some(Self::Pfm);
         }
@@ -126,7 +126,7 @@ pub(super) fn decode(
         Some(value) => Ok(raster.marked(value)?),
         None => Ok(raster),
     };
-    guarded(|| match Kind::of(bytes) {
+    guarded(|| match Kind::detect(bytes) {
         Some(Kind::Pfm) => decode_pfm(bytes, max_pixels).and_then(marked),
         Some(Kind::Tiff) => tiff::decode(bytes, max_pixels, no_data),
         Some(Kind::Npy) => npy::decode(bytes, max_pixels).and_then(marked),
@@ -266,7 +266,7 @@ mod tests {
     fn foreign_files_are_named() {
         for (at, magic, what, remedy) in FOREIGN {
             let bytes = [&vec![0; at][..], magic, &[0; 64]].concat();
-            assert_eq!(Kind::of(&bytes), None, "{what}");
+            assert_eq!(Kind::detect(&bytes), None, "{what}");
             assert_eq!(unknown(&bytes), format!("is {what}, which is not read here: {remedy}"));
         }
         assert!(

@@ -30,7 +30,7 @@ pub(super) fn is_npz(bytes: &[u8]) -> bool {
 
 /// Decodes an array of rows of pixels, of single numbers or of 1 to 4 channels.
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, ReadError> {
-    let header = Header::of(bytes)?;
+    let header = Header::parse(bytes)?;
     let (size, channels) = header.image()?;
     file::check_size(size.0 as u64, size.1 as u64, max_pixels)?;
     let count = size.0 * size.1 * channels;
@@ -72,7 +72,7 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(word: &str) -> Option<Self> {
+    fn parse(word: &str) -> Option<Self> {
         let (kind, bytes) = word.split_at_checked(1)?;
         let bytes = bytes.parse().ok()?;
         match (kind, bytes) {
@@ -139,7 +139,7 @@ struct Header {
 }
 
 impl Header {
-    fn of(bytes: &[u8]) -> Result<Self, ReadError> {
+    fn parse(bytes: &[u8]) -> Result<Self, ReadError> {
         let cut = || damaged("the header of the array is cut off");
         let rest = bytes.strip_prefix(MAGIC).ok_or_else(cut)?;
         let (start, length) = match rest {
@@ -167,7 +167,7 @@ impl Header {
         let kind = value("descr").ok_or_else(wrong)?;
         let kind = kind.strip_prefix('\'').and_then(|kind| kind.split('\'').next()).unwrap_or("a structure");
         let (order, word) = kind.split_at(kind.len().min(1));
-        let Some(known) = Kind::of(word).filter(|_| ["<", ">", "|", "="].contains(&order)) else {
+        let Some(known) = Kind::parse(word).filter(|_| ["<", ">", "|", "="].contains(&order)) else {
             let kind: String = kind.chars().filter(|c| !c.is_control()).take(20).collect();
             return Err(
                 format!("is an array of {kind}; save it as float32: array.astype(\"float32\")").into()

@@ -159,7 +159,7 @@ impl Reader {
     fn with_kind(self, path: &Path) -> Result<(Option<Kind>, Raster<'static>)> {
         let bytes = load(path, self.max_pixels)?;
         let raster = decode(&bytes, self.max_pixels, self.no_data);
-        Ok((Kind::of(&bytes), raster.map_err(|cause| Error::read(path, cause))?.named(path)))
+        Ok((Kind::detect(&bytes), raster.map_err(|cause| Error::read(path, cause))?.named(path)))
     }
 
     /// Reads a mask from any image that [`Reader::pair`] reads: `true` where a pixel is not black (alpha does not count).

@@ -73,7 +73,7 @@ impl<'a> Job<'a> {
             matcher,
             pair,
             find,
-            found: S::FOUND,
+            found: S::AUTOMATIC,
             method: None,
             region: None,
             cancel: None,
@@ -93,7 +93,7 @@ impl<'a> Job<'a> {
         Self { region: Some(part), ..self }
     }
 
-    /// `listener` receives the progress as each stage begins. If the pair is matched [again](Search::FOUND), it
+    /// `listener` receives the progress as each stage begins. If the pair is matched [again](Search::AUTOMATIC), it
     /// restarts at 0. The listener may return a [`ControlFlow`]; a break ends the match with [`Error::Interrupted`].
     pub fn on_progress<A: Answer>(self, mut listener: impl FnMut(Progress) -> A + Send + 'a) -> Self {
         Self { listener: Some(Box::new(move |progress| listener(progress).goes_on())), ..self }

@@ -101,7 +101,7 @@ impl Matched {
     /// The expected error of every measured disparity, in pixels, from its confidence; `+inf` where nothing was measured.
     #[must_use]
     pub fn sigma(&self) -> Plane<f32> {
-        Sigma::of(&self.plan.method).map(&self.maps)
+        Sigma::for_method(&self.plan.method).map(&self.maps)
     }
 
     /// The reasons for the state of each pixel: bits of [`flag`](crate::maps::flag), 0 where it is measured

@@ -27,7 +27,7 @@ use check::check;
 pub use job::{Answer, Job};
 use matched::summed;
 pub use matched::{Matched, Timing};
-pub use search::{Found, Search};
+pub use search::{AutoRange, Search};
 #[cfg(not(target_arch = "wasm32"))]
 pub use shared::SharedMatcher;
 use std::sync::Arc;

@@ -11,7 +11,7 @@ pub trait Search: Send {
     /// Whether the range comes from sparse matches, which near surfaces may lack. If the maps suggest that the
     /// scene goes beyond the range, the pair is matched again with [half as many labels
     /// more](crate::check::wider). That result counts if it [finds](crate::check::goes_beyond) surfaces there.
-    const FOUND: bool = false;
+    const AUTOMATIC: bool = false;
 
     /// The range for `pair`.
     ///
@@ -35,10 +35,10 @@ impl Search for RangeInclusive<i32> {
 
 /// A range that was found from sparse matches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Found(pub DisparityRange);
+pub struct AutoRange(pub DisparityRange);
 
-impl Search for Found {
-    const FOUND: bool = true;
+impl Search for AutoRange {
+    const AUTOMATIC: bool = true;
 
     fn range(self, _: &Pair) -> Result<DisparityRange> {
         Ok(self.0)
@@ -46,7 +46,7 @@ impl Search for Found {
 }
 
 impl Search for RangeFull {
-    const FOUND: bool = true;
+    const AUTOMATIC: bool = true;
 
     fn range(self, pair: &Pair) -> Result<DisparityRange> {
         check::range(pair)

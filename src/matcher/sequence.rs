@@ -3,7 +3,7 @@
 use super::check::check;
 use super::{Matched, Matcher};
 use crate::backend::Backend;
-use crate::engine::{self, Match};
+use crate::engine::{self, MatchRun};
 use crate::error::Result;
 use crate::image::Pair;
 use crate::options::{DisparityRange, Method};
@@ -109,7 +109,7 @@ impl Matcher {
         range: DisparityRange,
         method: &Method,
         observer: Observer<'_>,
-    ) -> Result<Option<(Tiles, Match)>> {
+    ) -> Result<Option<(Tiles, MatchRun)>> {
         let Self { threads, gpu: Some(device), checked, timings: false, .. } = self else { return Ok(None) };
         let (width, height) = pair.size();
         let plan = Plan::new(width, height, range, method)?;
@@ -149,5 +149,5 @@ struct Flight {
     pair: Pair,
     range: DisparityRange,
     tiles: Tiles,
-    started: Match,
+    started: MatchRun,
 }

@@ -101,7 +101,7 @@ options! {
         /// that none is preferred. It may not be larger than the largest matching cost.
         outside_cost: f64 = 0.7, takes real(0.0..=MatchingCost::Sad.facts().most), unit "as the matching cost", source "open";
         /// How a level's cost volume comes from the next finer one.
-        pyramid: Pyramid = Pyramid::Minimum, takes one_of(Pyramid::WORDS), source "section 2.4: low-pass; open along the labels", of readings;
+        pyramid: Pyramid = Pyramid::Minimum, takes one_of(Pyramid::WORDS), source "section 2.4: low-pass; open along the labels", for reproduction;
     }
 }
 

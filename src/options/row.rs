@@ -34,7 +34,7 @@ pub struct Key {
     pub source: &'static str,
     /// Whether the option only serves to reproduce other readings of the paper. Lists of options leave these
     /// out unless asked.
-    pub of_readings: bool,
+    pub for_reproduction: bool,
 }
 
 impl Key {
@@ -165,7 +165,7 @@ macro_rules! options {
             $(
                 $(#[doc = $meaning:literal])+
                 $field:ident: $type:ty = $default:expr, takes $takes:expr, $(unit $unit:literal,)? source $source:literal
-                    $(, of $readings:ident)?;
+                    $(, for $purpose:ident)?;
             )+
         }
     ) => {
@@ -202,7 +202,7 @@ macro_rules! options {
                         unit: concat!($($unit)?),
                         meaning: concat!($($meaning),+).trim_ascii(),
                         source: $source,
-                        of_readings: !concat!($(stringify!($readings))?).is_empty(),
+                        for_reproduction: !concat!($(stringify!($purpose))?).is_empty(),
                     },
                 )+ ],
             };

@@ -1,6 +1,6 @@
 //! Likely faults of a rectification.
 
-use crate::calibration::cameras::Views;
+use crate::calibration::cameras::RectifiedViews;
 use crate::calibration::lens::Lens;
 use crate::image::calib::{Calibration, Fit, Unit};
 
@@ -158,7 +158,11 @@ const FAR: f64 = 0.1;
 
 /// The doubt about `views`, for images of these `sizes`, that seem to be for another size of the rectified
 /// images.
-pub(super) fn of_views(lenses: &[Lens; 2], views: &Views, sizes: [(usize, usize); 2]) -> Option<Doubt> {
+pub(super) fn of_views(
+    lenses: &[Lens; 2],
+    views: &RectifiedViews,
+    sizes: [(usize, usize); 2],
+) -> Option<Doubt> {
     let rectified = views.size.unwrap_or(sizes[0]);
     let ends = [rectified.0, rectified.1].map(|end| end as f64);
     let at = [0, 1].map(|view| {

@@ -3,7 +3,7 @@
 use super::trust::Trust;
 use super::two_views::{Correspondence, TwoViews};
 use super::{Options, Rectification, views};
-use crate::calibration::cameras::Views;
+use crate::calibration::cameras::RectifiedViews;
 use crate::calibration::matrix::{IDENTITY, rotation};
 use crate::error::{RectificationError, Result};
 use crate::image::calib::{Camera, Unit};
@@ -72,7 +72,7 @@ impl Rectification {
         let start = TwoViews::start(size);
         let lens = start.lens()?;
         let camera = Camera { focal_length: lens.focal_length, principal_point: lens.principal_point };
-        let views = Views {
+        let views = RectifiedViews {
             rotations: [IDENTITY, rotation([0.0, 0.0, -angle])],
             cameras: [camera; 2],
             translation: [-1.0, 0.0],
@@ -137,7 +137,7 @@ fn is_flat(off_one_plane: f64) -> bool {
 /// The geometry of the views, and the matches that agree with it.
 fn geometry(matches: &[Correspondence], size: (usize, usize)) -> Result<(TwoViews, Vec<Correspondence>)> {
     let few = |agreeing| RectificationError::Few { agreeing, matches: matches.len(), least: LEAST };
-    let views = TwoViews::of(matches, size).ok_or_else(|| few(0))?;
+    let views = TwoViews::estimate(matches, size).ok_or_else(|| few(0))?;
     let tolerance = TwoViews::tolerance(size);
     let agreeing: Vec<_> =
         matches.iter().filter(|of| views.distance(of).abs() <= tolerance).copied().collect();

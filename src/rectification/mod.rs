@@ -35,7 +35,7 @@ pub use options::Options;
 pub use trust::Trust;
 pub use two_views::Correspondence;
 
-use crate::calibration::cameras::{StereoCalibration, Views};
+use crate::calibration::cameras::{RectifiedViews, StereoCalibration};
 use crate::calibration::lens::{Distortion, Lens};
 use crate::calibration::matrix::{IDENTITY, Matrix, product, rotated, rotation, transposed};
 use crate::error::{Error, Purpose, Result};
@@ -52,7 +52,7 @@ use std::borrow::Cow;
 pub struct Rectification {
     lenses: [Lens; 2],
     /// The rectified views, whose epipolar lines are rows.
-    views: Views,
+    views: RectifiedViews,
     /// (width, height) of the images of both views.
     images: [(usize, usize); 2],
     /// (width, height) of the rectified views: that of the left image, unless the calibration has another.
@@ -135,7 +135,7 @@ impl Rectification {
     /// The rectification by `views`, rotated if they are vertical.
     fn of_views(
         lenses: &[Lens; 2],
-        views: Views,
+        views: RectifiedViews,
         images: [(usize, usize); 2],
         unit: Unit,
         doubts: Vec<Doubt>,
@@ -330,14 +330,15 @@ impl Rectification {
         right.principal_point[0] += calibration.doffs.unwrap_or(0.0);
         let found = Self::of_cameras([left, right], size)?;
         let translation = [-baseline, 0.0];
-        Ok(Self { views: Views { translation, ..found.views }, unit: calibration.unit, ..found })
+        Ok(Self { views: RectifiedViews { translation, ..found.views }, unit: calibration.unit, ..found })
     }
 
     /// The identity for these cameras, with an arbitrary baseline.
     pub(crate) fn of_cameras(cameras: [Camera; 2], size: (usize, usize)) -> Result<Self> {
         let lens = |camera: Camera| Lens::new(camera.focal_length, camera.principal_point, Distortion::NONE);
         let lenses = [lens(cameras[0])?, lens(cameras[1])?];
-        let views = Views { rotations: [IDENTITY; 2], cameras, translation: [-1.0, 0.0], size: None };
+        let views =
+            RectifiedViews { rotations: [IDENTITY; 2], cameras, translation: [-1.0, 0.0], size: None };
         Self::of_views(&lenses, views, [size; 2], Unit::default(), Vec::new())
     }
 
@@ -369,12 +370,12 @@ impl Rectification {
 }
 
 /// Rotates vertical views so that epipolar lines are rows and the right view is to the right; with their size.
-fn turned(views: Views, (width, height): (usize, usize)) -> (Views, (usize, usize)) {
+fn turned(views: RectifiedViews, (width, height): (usize, usize)) -> (RectifiedViews, (usize, usize)) {
     if !views.is_vertical() {
         return (views, (width, height));
     }
     let (right, bottom) = (width as f64 - 1.0, height as f64 - 1.0);
-    let Views { rotations, cameras, translation: [_, down], size } = views;
+    let RectifiedViews { rotations, cameras, translation: [_, down], size } = views;
     // The left camera is above the right one if it is up in the frame of the right view.
     let above = down < 0.0;
     let turn: Matrix = if above {
@@ -388,5 +389,5 @@ fn turned(views: Views, (width, height): (usize, usize)) -> (Views, (usize, usiz
     });
     let rotations = rotations.map(|rotation| product(&turn, &rotation));
     let size = size.map(|(width, height)| (height, width));
-    (Views { rotations, cameras, translation: [-down.abs(), 0.0], size }, (height, width))
+    (RectifiedViews { rotations, cameras, translation: [-down.abs(), 0.0], size }, (height, width))
 }

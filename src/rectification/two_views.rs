@@ -64,7 +64,7 @@ impl TwoViews {
 
     /// The geometry of views of `size` that most of the `matches` support; `None` if they are fewer than a
     /// sample.
-    pub(super) fn of(matches: &[Correspondence], size: (usize, usize)) -> Option<Self> {
+    pub(super) fn estimate(matches: &[Correspondence], size: (usize, usize)) -> Option<Self> {
         if matches.len() < SAMPLE {
             return None;
         }

@@ -1,6 +1,6 @@
 //! Chooses the rectified views by Bouguet's method, like OpenCV.
 
-use crate::calibration::cameras::{Pose, Views};
+use crate::calibration::cameras::{Pose, RectifiedViews};
 use crate::calibration::lens::Lens;
 use crate::calibration::matrix::{
     Matrix, cross, length, product, rotated, rotation, rotation_vector, scaled, transposed,
@@ -20,7 +20,7 @@ pub(super) fn choose(
     pose: &Pose,
     size: (usize, usize),
     options: &Options,
-) -> Result<Views> {
+) -> Result<RectifiedViews> {
     let error = |reason: &str| Err(Error::Calibration(reason.into()));
     let vector = rotation_vector(&pose.rotation);
     if length(vector) >= std::f64::consts::FRAC_PI_2 {
@@ -71,7 +71,7 @@ pub(super) fn choose(
     }
     let mut translation = [0.0; 2];
     translation[axis] = t[axis];
-    Ok(Views { rotations, cameras, translation, size: None })
+    Ok(RectifiedViews { rotations, cameras, translation, size: None })
 }
 
 /// Averages the principal points, or at least the coordinate across the epipolar lines.

@@ -1,7 +1,7 @@
 //! Noise: the finest detail that the two views do not share, because of their sensors or of compression.
 
 use super::rows::MIN_MATCHES;
-use crate::front::matches::Match;
+use crate::front::matches::SparseMatch;
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
 use rayon::prelude::*;
@@ -25,14 +25,14 @@ const NEARLY_WHOLE: f64 = 0.2;
 const MAX_DETAIL: i32 = 2;
 
 /// The standard deviation by which to smooth both views, from matches at half their size; 0 for none.
-pub(super) fn smoothing(pair: &Pair, matches: &[Match]) -> f64 {
+pub(super) fn smoothing(pair: &Pair, matches: &[SparseMatch]) -> f64 {
     let shared = shared_detail(pair, matches);
     let smoothing = SMOOTHING.iter().find(|(least, _)| shared.is_some_and(|shared| shared < *least));
     smoothing.map_or(0.0, |(_, sigma)| *sigma)
 }
 
 /// The correlation of the finest detail over all patches; `None` if there are too few.
-fn shared_detail(pair: &Pair, matches: &[Match]) -> Option<f64> {
+fn shared_detail(pair: &Pair, matches: &[SparseMatch]) -> Option<f64> {
     let patches: Vec<_> = matches.par_iter().filter_map(|m| details(pair, m)).collect();
     if patches.len() < MIN_MATCHES {
         return None;
@@ -42,7 +42,7 @@ fn shared_detail(pair: &Pair, matches: &[Match]) -> Option<f64> {
 }
 
 /// The finest detail around a match in the left and the right view, if its disparity is nearly a whole number of pixels.
-fn details(pair: &Pair, m: &Match) -> Option<[[i32; PIXELS]; 2]> {
+fn details(pair: &Pair, m: &SparseMatch) -> Option<[[i32; PIXELS]; 2]> {
     let (x, y) = (2 * m.x, 2 * m.y);
     let left = Patch::new(pair.left(), x, y)?;
     let expected = x as i32 - (2 * m.disparity + FRACTION / 2).div_euclid(FRACTION);

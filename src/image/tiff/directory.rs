@@ -34,7 +34,7 @@ impl<'a> Directory<'a> {
     ///
     /// # Errors
     /// A description of the damage, in one line.
-    pub(super) fn of(file: &'a [u8]) -> Result<Self, ReadError> {
+    pub(super) fn parse(file: &'a [u8]) -> Result<Self, ReadError> {
         let (order, big) = match file {
             [b'I', b'I', kind, 0, ..] => (ByteOrder::LittleEndian, *kind == 43),
             [b'M', b'M', 0, kind, ..] => (ByteOrder::BigEndian, *kind == 43),

@@ -64,9 +64,9 @@ pub(super) fn decode(
     max_pixels: u64,
     no_data: Option<f64>,
 ) -> Result<Raster<'static>, ReadError> {
-    let directory = Directory::of(file)?;
-    let colours = Colours::of(&directory)?;
-    let layout = Layout::of(&directory, &colours, file.len(), max_pixels)?;
+    let directory = Directory::parse(file)?;
+    let colours = Colours::from_directory(&directory)?;
+    let layout = Layout::from_directory(&directory, &colours, file.len(), max_pixels)?;
     let no_data = no_data.map_or_else(|| no_data_of(&directory), |value| Ok(Some(value)))?;
     let samples = layout.samples(file, no_data.unwrap_or(0.0))?;
     let no_data = no_data.map(|value| holding(&samples, layout.read, colours.stored(), value)).transpose()?;
@@ -94,7 +94,7 @@ fn no_data_of(directory: &Directory) -> Result<Option<f64>, ReadError> {
 }
 
 impl<'a> Layout<'a> {
-    fn of(
+    fn from_directory(
         directory: &Directory<'a>,
         colours: &Colours,
         file_bytes: usize,
