@@ -22,7 +22,7 @@ pub enum Error {
     Read {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         #[source]
         cause: ReadError,
     },
@@ -31,7 +31,7 @@ pub enum Error {
     Write {
         /// The file.
         path: PathBuf,
-        /// What went wrong.
+        /// The reason.
         #[source]
         reason: Reason,
     },
@@ -40,7 +40,7 @@ pub enum Error {
     Option {
         /// The key, such as `levels`.
         key: String,
-        /// What is wrong with it.
+        /// The cause.
         #[source]
         cause: OptionError,
     },
@@ -126,7 +126,7 @@ pub enum ReadError {
         line: Option<usize>,
         /// The key.
         key: String,
-        /// What is wrong with it.
+        /// The cause.
         cause: OptionError,
     },
     /// Any other cause, with the remedy if there is one.
@@ -159,7 +159,7 @@ impl Reason {
         self.of_request
     }
 
-    /// The same error, with its text replaced by `f` of it.
+    /// Replaces the text by `f` of it.
     #[must_use]
     pub fn reworded(self, f: impl FnOnce(&str) -> String) -> Self {
         Self { text: f(&self.text), ..self }
@@ -226,7 +226,7 @@ impl<T: Into<Reason>> From<T> for ReadError {
     }
 }
 
-/// What is wrong with a key of a [`Method`](crate::options::Method).
+/// An error in a key of a [`Method`](crate::options::Method).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OptionError {
@@ -277,7 +277,7 @@ pub enum OptionError {
     },
 }
 
-/// What is wrong with a range of disparities; all numbers are in pixels.
+/// An error in a range of disparities; all numbers are in pixels.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RangeError {
@@ -356,7 +356,7 @@ pub enum RectificationError {
     Forward,
 }
 
-/// What is wrong with an [`Execution`](crate::options::Execution).
+/// An error in an [`Execution`](crate::options::Execution).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExecutionError {

@@ -32,8 +32,7 @@ pub struct LevelGraph {
     incoming: Vec<Incoming>,
 }
 
-/// An entry of the transposed table: the factor's place relative to the pixel, and the slot that holds the
-/// pixel.
+/// An entry of the transposed table: a factor, relative to the pixel, and its slot that holds the pixel.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Incoming(u16);
@@ -148,8 +147,7 @@ impl LevelGraph {
     /// Calls `with` for every slot that holds one of `pixels`, with the index of the pixel among them.
     #[inline(always)]
     fn each_member(&self, pixels: &Range<usize>, mut with: impl FnMut(usize, Incoming)) {
-        // By code: the step from a factor to its member, and the entry of slot 0. The step of an empty slot
-        // leads out of the image.
+        // By code: the step to the member, which leaves the image for an empty slot, and the entry of slot 0.
         let mut steps = [isize::MIN / 2; 1 << u8::BITS];
         let mut entries = [Incoming::default(); 1 << u8::BITS];
         for ((step, entry), (&to, (dx, dy))) in
@@ -237,8 +235,7 @@ const AROUND: usize = GRAPH_WINDOW * GRAPH_WINDOW - 1;
 #[repr(align(64))]
 struct Keys([[i32; LANES]; AROUND]);
 
-/// The offsets of the window without its centre, by distance and then in raster order. The rank in this order
-/// breaks ties.
+/// The offsets of the window without its centre, by distance, then in raster order, which breaks ties.
 pub(crate) fn by_distance() -> Vec<(i32, i32)> {
     let mut window: Vec<(i32, i32)> = offsets().filter(|&o| o != (0, 0)).collect();
     window.sort_by_key(|&(dx, dy)| dx * dx + dy * dy);

@@ -166,8 +166,7 @@ mod tests {
         assert_eq!(back(&map).final_map(), map);
         assert_eq!(back(&map).validity, maps.validity);
 
-        // Disparities that a user removed are missing even if they were filled in; so are values that no
-        // match gives.
+        // Disparities that a user removed count as missing, even filled ones, and so do unmatched ones.
         let taken = [f32::INFINITY, f32::NAN, 0.5, 2e6];
         let without = back(&Plane::new(4, 1, taken.to_vec()));
         assert_eq!(without.validity.data(), [flag::MASKED, flag::MASKED, flag::MASKED, flag::MASKED]);

@@ -15,7 +15,7 @@ fn available() -> Option<u64> {
     known.then(|| system.available_memory())
 }
 
-/// Browsers do not tell.
+/// Unknown in browsers.
 #[cfg(target_arch = "wasm32")]
 fn available() -> Option<u64> {
     None
@@ -49,7 +49,7 @@ impl Claim {
     /// Claims `bytes` for work on an image.
     ///
     /// # Errors
-    /// Those of [`check`], for this claim and for the sum of all claims.
+    /// The errors of [`check`], for this claim and for the sum of all claims.
     pub(crate) fn new(bytes: u64) -> Result<Self, MemoryError> {
         // Check the claim by itself first, so that the error of one that is too large never depends on others.
         check(bytes, Purpose::Image)?;

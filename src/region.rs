@@ -7,8 +7,7 @@ use crate::options::DisparityRange;
 use crate::program::tiles::OVERLAP;
 use std::ops::Range;
 
-/// Windows begin on multiples of this many pixels, the pixel size of the coarsest level, so that their
-/// pyramids use the same pixels as that of the whole pair.
+/// Windows start at multiples of this many pixels, the pixel size of the coarsest level, to share its grid.
 const GRID: usize = 32;
 
 /// A region of the left view, which is matched like a tile. Its maps may differ from those of the whole pair,

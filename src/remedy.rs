@@ -63,8 +63,7 @@ pub struct Vocabulary {
 }
 
 impl Vocabulary {
-    /// A front end with the names of the library and without the options that may be missing. Each front end
-    /// sets its own `cpu`.
+    /// The names of the library, without optional remedies. Each front end sets its own `cpu`.
     pub const PLAIN: Self = Self {
         key: ["", ""],
         keys: None,

@@ -38,8 +38,7 @@ impl Sigma {
         (self.floor * self.floor + falling * falling).sqrt() as f32
     }
 
-    /// The expected error of every pixel; `+inf` where nothing was measured, even if the disparity was filled
-    /// in.
+    /// The expected error of every pixel; `+inf` where nothing was measured, even if it was filled in.
     #[must_use]
     pub fn map(&self, maps: &Maps) -> Plane<f32> {
         let of_each: Vec<f32> = (0..=u8::MAX).map(|confidence| self.at(confidence)).collect();

@@ -3,8 +3,7 @@
 use crate::image::{Image, Plane};
 use crate::maps::{FRACTION, Maps, flag, has_disparity};
 
-/// A temporal filter for the maps of a sequence: where the image does not change, the disparity is averaged
-/// over time, weighted by confidence.
+/// A temporal filter for disparity maps: where the image is unchanged, it averages over time by confidence.
 ///
 /// Each map is computed without the frames before, so noise makes static surfaces flicker. The filter keeps a
 /// mean of the last frames (open) wherever the left view does not change. Where something moves, the
@@ -122,8 +121,7 @@ impl Past {
                 *d = before + (2 * moved + whole).div_euclid(2 * whole);
                 *w = both;
             } else if weighed / 2 > *w {
-                // A single less confident frame disagrees: keep the past, but halve its weight so that a
-                // change that persists soon wins.
+                // A less confident frame disagrees: keep the past at half its weight; lasting changes win.
                 (*d, *w) = (before, weighed / 2);
             }
         }
@@ -150,8 +148,7 @@ fn beside(row: &[u16]) -> Vec<u16> {
     row.iter().zip(next).map(|(a, b)| a.abs_diff(*b)).collect()
 }
 
-/// The sums over the window of each pixel, from the rows of a plane, whose border pixels are repeated beyond
-/// it.
+/// Window sums of each pixel from the rows of a plane, whose border is repeated.
 fn window_sums(width: usize, rows: impl Iterator<Item = Vec<u16>>) -> Vec<u32> {
     let mut padded = vec![0; width + 2 * RADIUS];
     let across: Vec<Vec<u32>> = rows

@@ -33,8 +33,7 @@ const PIXELS: usize = 1024;
 #[cfg(not(target_arch = "wasm32"))]
 const FEW: usize = 8;
 
-/// Environment variables that may lower the number of threads below that of processors: conventions of other
-/// programs, and Slurm's grants.
+/// Environment variables that limit the threads: conventions of other programs, and Slurm's grants.
 const VARIABLES: [&str; 4] =
     ["RAYON_NUM_THREADS", "OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK", "SLURM_CPUS_ON_NODE"];
 
@@ -212,8 +211,7 @@ mod tests {
             (&[("SLURM_CPUS_ON_NODE", "1")], 1),
             // The smallest of all variables.
             (&[("SLURM_CPUS_ON_NODE", "6"), ("SLURM_CPUS_PER_TASK", "4"), ("OMP_NUM_THREADS", "5")], 4),
-            // Values that are no positive number are ignored, and none raises the number above that of
-            // processors.
+            // Values that are no positive number are ignored, and no value exceeds the number of processors.
             (&[("OMP_NUM_THREADS", "0")], 8),
             (&[("OMP_NUM_THREADS", ""), ("RAYON_NUM_THREADS", "many"), ("SLURM_CPUS_PER_TASK", "-1")], 8),
             (&[("OMP_NUM_THREADS", "64")], 8),

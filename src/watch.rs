@@ -88,7 +88,7 @@ impl<'a> Watch<'a> {
     /// Like [`Self::host`], for a step that waits for a device.
     ///
     /// # Errors
-    /// Those of [`Self::host`].
+    /// The errors of [`Self::host`].
     pub async fn host_async<T>(
         &mut self,
         name: &'static str,

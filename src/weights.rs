@@ -6,8 +6,7 @@ use crate::options::Method;
 pub const MEDIAN_WEIGHT: u8 = 127;
 /// The largest part of the centre's weight that distance alone subtracts.
 const MEDIAN_SPACE: f64 = 96.0;
-/// The median uses every second row of its window, with all columns: the row spacing is 2 to this many
-/// pixels.
+/// The row spacing in the windows of the median is 2 to this many pixels; all columns are used.
 pub const WINDOW_ROW_BITS: u32 = 1;
 /// Spacing of the places in the two windows that fill pixels, along rows and along columns: 2 to this many pixels.
 /// The first window reaches far in all directions, the second along rows, where roads and floors keep one disparity.

@@ -427,7 +427,7 @@ fn the_number_of_threads_changes_no_bit() {
     }
 }
 
-/// The same image with other values where it is masked.
+/// A copy of the image with other values where it is masked.
 fn poisoned(random: &mut Random, image: &Image) -> Image {
     let mut pixels = image.pixels.clone();
     for (pixel, &masked) in pixels.data_mut().iter_mut().zip(image.masked.data()) {

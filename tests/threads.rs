@@ -1,4 +1,4 @@
-//! Which threads do the work, and how many.
+//! The threads that do the work, and their number.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 

@@ -518,7 +518,7 @@ fn defective_parts_are_warned_about() {
     }
 }
 
-/// What the mask of one view covers is excluded from the statistics of both.
+/// Pixels masked in one view are excluded from the statistics of both.
 #[test]
 fn a_mask_causes_no_warning() {
     let mixed = Case::scene("mixed").pair;

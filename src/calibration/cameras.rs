@@ -47,8 +47,7 @@ pub struct RectifiedViews {
     pub rotations: [Matrix; 2],
     /// The rectified cameras.
     pub cameras: [Camera; 2],
-    /// The position of the left camera in the frame of the right view, x and y, in the unit of the
-    /// calibration. One of them is 0.
+    /// The left camera (x, y) in the right view's frame, in the unit of the calibration. One of the two is 0.
     pub translation: [f64; 2],
     /// Width and height of the rectified images, if the calibration has them; else they are those of the images.
     pub size: Option<(usize, usize)>,
@@ -285,7 +284,7 @@ impl StereoCalibration {
     /// else scaled as in [`Calibration::of_size`]. `None` if the file has no rectification.
     ///
     /// # Errors
-    /// Those of [`RectifiedViews::calibration`], and [`Error::Calibration`] when it is for several sizes but not for this one.
+    /// The errors of [`RectifiedViews::calibration`], and [`Error::Calibration`] when it is for several sizes but not for this one.
     pub fn of_rectified_images(&self, size: Option<(usize, usize)>) -> Result<Option<Calibration>> {
         let in_size = |of: Calibration| size.map_or_else(|| of.clone(), |size| of.of_size(size));
         if let Some(benchmark) = &self.benchmark {
@@ -315,8 +314,7 @@ impl StereoCalibration {
     pub(super) fn with_pose_of_views(mut self) -> Self {
         self.pose = self.pose.or_else(|| {
             let RectifiedViews { rotations: [left, right], translation: [x, y], .. } = self.views?;
-            // A point goes to the left view, along the baseline to the right one, and back to the right
-            // camera.
+            // A point goes to the left view, along the baseline to the right one, and to the right camera.
             let back = transposed(&right);
             Some(Pose { rotation: product(&back, &left), translation: rotated(&back, [x, y, 0.0]) })
         });

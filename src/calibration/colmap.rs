@@ -66,7 +66,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     let entry = entries.require(IMAGES, IMAGES, "COLMAP's images, in the other file")?;
     let images = entry.items()?;
     let Ok([left, right]) = <[Entry; 2]>::try_from(images) else {
-        return Err(entry.error("has not two images; keep the two of the pair, the left one first"));
+        return Err(entry.error("does not have two images; keep the two of the pair, the left one first"));
     };
     pair(&image(left, &cameras)?, &image(right, &cameras)?, Unit::Unknown)
 }
@@ -88,7 +88,7 @@ fn image<'a>(entry: Entry<'a>, cameras: &Entry) -> Result<Posed<'a>> {
         }
     }
     let (lens, size) =
-        found.ok_or_else(|| entry.error(format_args!("is of camera {id}, which {CAMERAS} has not")))?;
+        found.ok_or_else(|| entry.error(format_args!("is of camera {id}, which {CAMERAS} lacks")))?;
     Ok(Posed { lens, size: Some(size), pose, entry })
 }
 

@@ -153,7 +153,7 @@ const TEXTS: &[(&str, &[&str], &str, &str)] = &[
         "{",
         &["\"cameraparameters1\""],
         "is stereoParameters of MATLAB, whose matrices are transposed",
-        "write what stereoParametersToOpenCV gives as OpenCV has it",
+        "convert it with stereoParametersToOpenCV, and write it in a format of OpenCV",
     ),
     ("[", &["\"sensor_token\"", "\"camera_intrinsic\""], "is nuScenes's of all its cameras", OPENCV),
     ("{", &["\"nbformat\""], "is a notebook of Jupyter", "give a calibration"),

@@ -68,8 +68,7 @@ pub(crate) fn of_quaternion([w, x, y, z]: [f64; 4]) -> Option<Matrix> {
     ])
 }
 
-/// The inverse of [`rotation`], for a rotation by less than half a turn: its axis, with its angle in radians
-/// as length.
+/// The inverse of [`rotation`] for less than half a turn: the axis, with the angle in radians as length.
 #[must_use]
 pub fn rotation_vector(m: &Matrix) -> [f64; 3] {
     // The axis, scaled to twice the sine of the angle.

@@ -59,8 +59,7 @@ impl Node {
         }
     }
 
-    /// The numbers of a matrix that OpenCV wrote in base64: a header of 24 bytes with their type, such as
-    /// `1d`, then the numbers.
+    /// Numbers of a matrix in OpenCV's base64, after 24 bytes that state their type, such as `1d`.
     fn packed(&self) -> Option<Vec<f64>> {
         let Self::Scalar(text) = self else { return None };
         let text: String = text.trim_start_matches("$base64$").split_whitespace().collect();

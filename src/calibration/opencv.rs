@@ -309,8 +309,7 @@ fn views(entries: &Entries) -> Result<RectifiedViews> {
 #[derive(Clone, Copy)]
 pub(super) struct Projection {
     pub(super) camera: Camera,
-    /// The origin in the frame of the camera, x and y: the fourth column of its matrix divided by the focal
-    /// length.
+    /// The origin (x, y) in the camera's frame: the fourth column of its matrix divided by the focal length.
     pub(super) offset: [f64; 2],
 }
 

@@ -20,7 +20,7 @@ pub fn read(file: &Path) -> Result<ThirdCamera> {
 /// Like [`read`], for a text in memory, which errors call `name`.
 ///
 /// # Errors
-/// Those of [`read`].
+/// The errors of [`read`].
 pub fn of_text(name: &Path, text: &str) -> Result<ThirdCamera> {
     let root = root(name, text)?;
     let entries = Entries::new(vec![(name, &root)]);

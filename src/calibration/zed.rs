@@ -42,7 +42,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     let known = || SIZES.map(|(name, _)| name.to_uppercase()).join(", ");
     StereoCalibration::of_sizes(sizes).ok_or_else(|| {
         let reason = format!(
-            "has no lenses of a pair: expected LEFT_CAM_ and RIGHT_CAM_ with {} behind it; give the file of both cameras",
+            "has no lenses of a pair: expected LEFT_CAM_ and RIGHT_CAM_ followed by {}; give the file of both cameras",
             known()
         );
         Error::read(entries.path(), reason)
@@ -56,8 +56,7 @@ fn of_size(entries: &Entries, name: &str, size: (usize, usize)) -> Result<Stereo
         let entry = entries.require(&section(side, name), &called, "the numbers of a lens")?;
         let numbers = entry.group()?;
         let number = |name: &str| numbers.number(name, name);
-        // Newer files have one model for all sizes. It takes precedence, as an older one may still be
-        // present.
+        // Newer files have one model for all sizes. It takes precedence over an older one.
         let of_all = entries.find(&format!("{side}disto")).map(|entry| entry.group()).transpose()?;
         let distortion = distortion(of_all.as_ref().unwrap_or(&numbers))?;
         let wrong = |_| entry.error("has a focal length that is not above 0; calibrate again");

@@ -260,8 +260,7 @@ impl MatchRun {
                 self.iterations += 1;
                 inspect(&mut Inspection::Iteration(backend, self.iterations))?;
             }
-            // With an inspector, wait for convergence so that no idle iterations are reported; this is
-            // slower.
+            // With an inspector, wait for convergence, so that no idle iteration is reported.
             Step::Settled => {
                 if backend.settled(looks_in).await? {
                     let rest = &self.program.steps[self.next..];

@@ -63,8 +63,7 @@ impl Mosaic {
         }
     }
 
-    /// Copies the maps of the core, and the labels of right pixels that this tile matches better than those
-    /// before.
+    /// Copies the maps of the core, and the labels of right pixels that this tile matches best so far.
     async fn place_left(&mut self, frame: &Frame, pair: &Pair, backend: &mut dyn Backend) -> Result<()> {
         let Frame { core, crop, .. } = frame;
         let part = core.within(crop);
@@ -110,8 +109,7 @@ impl Mosaic {
         Ok(())
     }
 
-    /// Copies the labels of a tile of the mirrored pair as labels of the right view, and the disparities if
-    /// its map is wanted.
+    /// Copies the right view's labels from a tile of the mirrored pair, and its disparities if wanted.
     async fn place_mirrored(&mut self, frame: &Frame, backend: &mut dyn Backend) -> Result<()> {
         let Frame { core, crop, .. } = frame;
         let part = core.within(crop);

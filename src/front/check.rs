@@ -32,8 +32,7 @@ const ROWS: usize = 8;
 /// rectified (indoors, from cars, from the air, rendered), none has more than 0.40 px; with one view shifted
 /// down by one pixel, all have 0.61 px or more.
 const MAX_OFFSET: u32 = FRACTION as u32 / 2;
-/// A corner that is found farther than this above or below its row, in 1/256 px, does not count as found on
-/// it.
+/// A corner found farther than this above or below its row, in 1/256 px, is off its row.
 const MAX_APART: u32 = 3 * FRACTION as u32 / 2;
 /// Percentage of matches with the wrong sign from which on the views count as swapped.
 const SWAPPED_PERCENT: usize = 90;
@@ -163,8 +162,7 @@ fn without_outliers(found: &[SparseMatch], size: (usize, usize)) -> Vec<i32> {
     sorted(&mut found.iter().filter(|m| usual.contains(&m.disparity) || !is_alone(m, found, size)))
 }
 
-/// Whether fewer than two other matches near `one` have a similar disparity: each part of a surface has
-/// several.
+/// Whether fewer than two other matches nearby have a similar disparity; parts of a surface have several.
 fn is_alone(one: &SparseMatch, all: &[SparseMatch], (width, height): (usize, usize)) -> bool {
     let reach = width.max(height) / PARTS;
     let beside = |m: &&SparseMatch| {
@@ -367,8 +365,7 @@ impl Warning {
 ///   cause that too; a user who gives a range with negative disparities knows, and is not warned. In an
 ///   unrectified pair, rotated cameras decide the sign of disparities.
 ///
-/// If the machine has too little memory for the search, only the checks without one are made: up to the
-/// copied parts.
+/// Without enough memory for the search, only the checks before it are made, up to the copied parts.
 #[must_use]
 pub fn warnings(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     let mut out = damaged(pair);

@@ -46,8 +46,7 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
     if options.level_rows {
         found.offset = rows::offset(&matches);
         if found.offset != 0 {
-            // Measured offsets are biased towards whole rows. The remaining offset is smaller, and so is its
-            // bias.
+            // Measured offsets are biased towards whole rows. What remains is smaller, and so is its bias.
             matches = rows::matches(&found.apply(pair).map(Image::downsampled), range);
             found.offset += rows::median_offset(&matches);
         }

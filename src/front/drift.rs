@@ -96,8 +96,7 @@ struct Sight {
 /// A rotation of the right camera of a rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
-    /// The axis of the rotation in the rectified right view (x right, y down, z forward), with the angle in
-    /// radians as length.
+    /// The rotation axis in the rectified right view (x right, y down, z forward) times the angle in rad.
     pub axis: [f64; 3],
     /// Standard error of each component, in radians, as if all frames showed one still scene.
     pub errors: [f64; 3],
@@ -109,8 +108,7 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// The angles by which the camera looks up, to the right and clockwise, in degrees, relative to its
-    /// calibration.
+    /// How far the camera has turned up, to the right and clockwise since its calibration, in degrees.
     #[must_use]
     pub fn degrees(&self) -> [f64; 3] {
         self.axis.map(f64::to_degrees)

@@ -13,8 +13,7 @@ impl Rectification {
     /// in one order are they on the same rows and in front of the cameras. Without matches the images keep their order.
     ///
     /// # Errors
-    /// Those of [`Rectification::new`]; [`Error::Memory`](crate::Error::Memory) when the machine has too
-    /// little memory for the rectified pair.
+    /// The errors of [`Rectification::new`]; [`Error::Memory`](crate::Error::Memory) if memory is too small.
     pub fn for_pair(calibration: &StereoCalibration, pair: &Pair, options: &Options) -> Result<Self> {
         let by = Self::of_sizes(calibration, pair.own_sizes(), options)?;
         if !by.has_exchanged_cameras() {

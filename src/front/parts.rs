@@ -16,8 +16,7 @@ const TEXTURED: u64 = 50;
 const COPIED_PERCENT: u64 = 60;
 /// Distance over which contrast is measured, in pixels: blur does not affect it.
 const FAR: usize = 8;
-/// Second difference of grey along a row that counts as no detail, in 1/256 of a level: rounding causes as
-/// much in blurred areas.
+/// Second differences of grey that count as no detail, in 1/256 of a level: rounding causes as much.
 const ROUNDING: f64 = 512.0;
 /// Ratio of the detail of a band between the views from which on one is blurred or covered (open). Of 68 sound pairs, one out
 /// of focus by 5 x 5 pixels among them, none has more than 2.4; blur with a sigma of 2 gives at least 4.3, of 4 gives 20.
@@ -130,8 +129,7 @@ struct Detail {
 }
 
 impl Detail {
-    /// The mean second difference of grey along the rows beyond `rounding`, relative to the `contrast`; 0 if
-    /// most is `masked`.
+    /// Mean second difference of grey beyond `rounding`, relative to the `contrast`; 0 if most is `masked`.
     fn of(image: &Image, masked: &Plane<bool>, contrast: f64, rounding: f64) -> Self {
         let (width, height) = image.pixels.size();
         let mut bands = [(0.0, 0); BANDS];

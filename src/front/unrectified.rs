@@ -7,8 +7,7 @@ use crate::maps::FRACTION;
 use crate::options::DisparityRange;
 use crate::rectification::{Correspondence, Options, Rectification};
 
-/// The largest sides, in pixels, of the pair for the coarse search and of the largest pair that is searched
-/// (open).
+/// The largest sides, in pixels, of the pairs for the coarse and the fine search (open).
 const SIDES: [usize; 2] = [320, 1600];
 /// The coarse search covers 1 / `REACH` of the height above and below.
 const REACH: usize = 3;
@@ -32,8 +31,7 @@ impl Rectification {
     /// look alike. That is repeated at twice the size, up to 1600 pixels.
     ///
     /// # Errors
-    /// Those of [`Rectification::of_matches`]; [`Error::Memory`] when the machine has too little memory for
-    /// the search.
+    /// The errors of [`Rectification::of_matches`]; [`Error::Memory`] if the machine has too little.
     pub fn of_pair(pair: &Pair, options: &Options) -> Result<Self> {
         Self::of_matches(&Self::matches_of(pair)?, pair.size(), options)
     }
@@ -92,8 +90,7 @@ fn finer(pair: &Pair, rough: &[Correspondence]) -> Result<Vec<Correspondence>> {
     search(pair, &by, range(&by, &agreeing), CORNERS[1], ROWS)
 }
 
-/// The matches of `pair`, searched after rectification `by` this: about this many `corners`, each up to
-/// `rows` above and below.
+/// Matches of `pair` after rectification: about so many `corners`, searched in `rows` above and below.
 fn search(
     pair: &Pair,
     by: &Rectification,

@@ -125,8 +125,7 @@ struct Features {
 /// A vector of features: all orientations of a wavelength, and two free places.
 const LANES: usize = ORIENTATIONS + 2;
 
-/// The smoothed magnitudes of the filters of a wavelength at their nodes, and the positions of the pixels
-/// among these.
+/// The smoothed filter magnitudes of a wavelength at its nodes, and where the pixels lie among these.
 struct Octave {
     nodes: Plane<[i16; LANES]>,
     across: Vec<Place>,

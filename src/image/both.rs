@@ -14,8 +14,7 @@ use crate::error::ReadError;
 const MPO: &[u8] = b"MPF\0";
 const JPS: &[u8] = b"_JPSJPS_";
 
-/// The left and the right view in the file `bytes`, called `path`, and whether the file says which is the
-/// left one.
+/// Both views in the file `bytes`, called `path`, and whether the file says which is the left one.
 pub(super) fn decode_both(
     path: &Path,
     bytes: &[u8],
@@ -78,7 +77,7 @@ impl Halves {
                 Err("holds both views mixed with each other; save them side by side, or as two files".into())
             }
             Some(_) => Ok(None),
-            None => Err(damaged("what it says of its views is cut off")),
+            None => Err(damaged("the description of its views is cut off")),
         }
     }
 }

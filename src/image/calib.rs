@@ -121,8 +121,7 @@ impl Calibration {
         Self { camera: Some(camera), doffs: Some(0.0), baseline: Some(baseline), unit, ..Self::default() }
     }
 
-    /// The calibration for images of this (width, height), if these are the file's images scaled; else an
-    /// unchanged copy.
+    /// The calibration for images of this (width, height) if they are scaled; otherwise an unchanged copy.
     #[must_use]
     pub fn of_size(&self, size: (usize, usize)) -> Self {
         let known = self.width.zip(self.height).map(|(width, height)| (width as usize, height as usize));
@@ -159,7 +158,7 @@ impl Calibration {
     /// Reads `calib.txt` from the folder of `image`; `None` when there is none.
     ///
     /// # Errors
-    /// Those of [`Calibration::read`].
+    /// The errors of [`Calibration::read`].
     pub fn beside(image: &Path) -> Result<Option<Self>> {
         let path = image.with_file_name("calib.txt");
         if path.exists() { Self::read(&path).map(Some) } else { Ok(None) }

@@ -21,8 +21,7 @@ impl Fit {
     /// The whole images, scaled; `None` if the aspect ratios differ.
     #[must_use]
     pub fn scaled(calibrated: (usize, usize), size: (usize, usize)) -> Option<Self> {
-        /// The scale must differ from 1 by this much to explain rounded sizes: an image that lacks a row is
-        /// not a scaled one.
+        /// The least difference of the scale from 1: an image that lacks a row is not a scaled one.
         const LEAST: f64 = 0.1;
         let scale = ratios(calibrated, size);
         let [width, height] = [calibrated.0, calibrated.1].map(|side| side as f64);

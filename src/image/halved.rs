@@ -91,8 +91,7 @@ mod tests {
         Image { pixels, masked: Plane::filled(width, height, false) }
     }
 
-    /// Without masked pixels, the fast path gives the same result as the other one; a masked pixel does not
-    /// count.
+    /// The fast path equals the general one without masked pixels; a masked pixel does not count.
     #[test]
     fn a_pixel_is_the_mean_of_its_block() {
         for (width, height) in [(36, 22), (2, 2), (2, 8), (40, 2)] {

@@ -12,8 +12,7 @@ use crate::error::ReadError;
 use crate::memory;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
-/// Signatures of a ZIP archive, which an `.npz` is, and of its parts: a file, an entry of the file list, and
-/// the end of the list.
+/// Signatures in a ZIP archive (`.npz`): of a file, of an entry of the file list, and of its end.
 const ARCHIVE: &[u8] = b"PK\x03\x04";
 const ENTRY: &[u8] = b"PK\x01\x02";
 const END: &[u8] = b"PK\x05\x06";

@@ -180,8 +180,7 @@ impl<'a> Raster<'a> {
         Ok(self.ignoring(ignored.into_data()))
     }
 
-    /// Why a part of the image may be wrong, with the name of its file: damage from which its decoder
-    /// recovered.
+    /// The damage, with the name of its file, from which the decoder recovered.
     #[must_use]
     pub fn doubt(&self) -> Option<&str> {
         self.doubt.as_deref()
@@ -334,8 +333,7 @@ pub(in crate::image) fn stretched(v: u8) -> u16 {
 }
 
 impl Pair {
-    /// A pair of two images in memory, with a common scale for their values. [`Reader::pair`] gives the
-    /// rules.
+    /// A pair of two images in memory, scaled alike by the rules of [`Reader::pair`].
     ///
     /// # Errors
     /// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values;
@@ -351,7 +349,7 @@ impl Pair {
     /// of one size from them.
     ///
     /// # Errors
-    /// Those of [`Pair::of_frames`], except about sizes.
+    /// The errors of [`Pair::of_frames`], except about sizes.
     pub fn of_raw_frames(left: Raster, right: Raster) -> Result<Self> {
         joined([left, right], ["the left image", "the right one"], Sizes::Any)
     }

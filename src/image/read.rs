@@ -77,7 +77,7 @@ impl Reader {
     /// Reads a pair of raw images, which may differ in size: see [`Pair::of_raw_frames`].
     ///
     /// # Errors
-    /// Those of [`Reader::pair`], except about sizes.
+    /// The errors of [`Reader::pair`], except about sizes.
     pub fn raw_pair(self, left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
         self.pair_of(left, right, mask, Sizes::Any)
     }
@@ -92,7 +92,7 @@ impl Reader {
     /// the left half unless it says otherwise. Also returns whether the file says which view is the left one.
     ///
     /// # Errors
-    /// Those of [`Reader::pair`], and when the file holds only one view.
+    /// The errors of [`Reader::pair`], and when the file holds only one view.
     pub fn both(self, file: &Path, mask: Option<&Path>) -> Result<(Pair, bool)> {
         let bytes = load(file, self.max_pixels)?;
         let views = both::decode_both(file, &bytes, self.max_pixels, self.no_data, self.orient);
@@ -140,7 +140,7 @@ impl Reader {
     /// Like [`Reader::pair`], from files in memory, each with its name for errors.
     ///
     /// # Errors
-    /// Those of [`Reader::pair`].
+    /// The errors of [`Reader::pair`].
     pub fn pair_in_memory(self, left: (&Path, &[u8]), right: (&Path, &[u8])) -> Result<Pair> {
         let image = |(name, bytes): (&Path, &[u8])| self.raster_in_memory(name, bytes);
         raster::joined([image(left)?, image(right)?], [left.0, right.0].map(Path::display), Sizes::Equal)
@@ -149,7 +149,7 @@ impl Reader {
     /// Like [`Reader::raster`], from a file in memory, with its name for errors.
     ///
     /// # Errors
-    /// Those of [`Reader::raster`].
+    /// The errors of [`Reader::raster`].
     pub fn raster_in_memory(self, name: &Path, bytes: &[u8]) -> Result<Raster<'static>> {
         let raster =
             decode(bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(name, cause))?;
@@ -254,7 +254,7 @@ impl Pair {
     /// Reads a rectified pair from two files, like [`Reader::pair`].
     ///
     /// # Errors
-    /// Those of [`Reader::pair`].
+    /// The errors of [`Reader::pair`].
     pub fn open(left: impl AsRef<Path>, right: impl AsRef<Path>) -> Result<Self> {
         Reader::default().pair(left.as_ref(), right.as_ref(), None)
     }
@@ -263,7 +263,7 @@ impl Pair {
 /// [`Reader::grey8`] with the default settings.
 ///
 /// # Errors
-/// Those of [`Reader::grey8`].
+/// The errors of [`Reader::grey8`].
 pub fn grey8(path: &Path) -> Result<Plane<u8>> {
     Reader::default().grey8(path)
 }
@@ -271,7 +271,7 @@ pub fn grey8(path: &Path) -> Result<Plane<u8>> {
 /// [`Reader::disparity`] with the default settings.
 ///
 /// # Errors
-/// Those of [`Reader::disparity`].
+/// The errors of [`Reader::disparity`].
 pub fn read_disparity(path: &Path) -> Result<Plane<f32>> {
     Reader::default().disparity(path)
 }

@@ -89,7 +89,7 @@ impl Plane<f32> {
     /// Writes this disparity map, like [`Writer::disparity`] with the default settings.
     ///
     /// # Errors
-    /// Those of [`Writer::disparity`].
+    /// The errors of [`Writer::disparity`].
     pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
         Writer::default().disparity(path.as_ref(), self)
     }

@@ -54,7 +54,7 @@ impl Matcher {
     /// Matches `pair` over the disparities of `search`: `0..=47`, or `..` for the range that sparse matches find.
     ///
     /// # Errors
-    /// Those of [`Job::run`].
+    /// The errors of [`Job::run`].
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run(&mut self, pair: &Pair, search: impl Search) -> Result<Matched> {
         self.job(pair, search).run()
@@ -148,8 +148,7 @@ impl<'a> Job<'a> {
             Ok(again) if check::goes_beyond(&again.maps, range) => {
                 Ok(Matched { range_found: found, ..again })
             }
-            // Keep the first match if the second finds nothing beyond or does not fit: the user did not ask
-            // for it.
+            // Keep the first match if the wider range finds nothing more or does not fit.
             Ok(_) | Err(Error::Range(_) | Error::Budget(_) | Error::Memory(_)) => Ok(matched),
             Err(e) => Err(e),
         }
@@ -158,7 +157,7 @@ impl<'a> Job<'a> {
     /// Matches the pair, and also writes the disparities to `out`, row by row, in pixels, `+inf` where there is none.
     ///
     /// # Errors
-    /// Those of [`Job::run`], and [`Error::Mismatch`] when `out` does not have one element per pixel of the maps.
+    /// The errors of [`Job::run`], and [`Error::Mismatch`] when `out` does not have one element per pixel of the maps.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run_into(self, out: &mut [f32]) -> Result<Matched> {
         pollster::block_on(self.run_into_async(out))

@@ -104,8 +104,7 @@ impl Matched {
         Sigma::for_method(&self.plan.method).map(&self.maps)
     }
 
-    /// The reasons for the state of each pixel: bits of [`flag`](crate::maps::flag), 0 where it is measured
-    /// and trusted.
+    /// The state of each pixel: bits of [`flag`](crate::maps::flag), 0 where it is measured and trusted.
     #[must_use]
     pub fn validity(&self) -> &Plane<u8> {
         &self.maps.validity
@@ -121,8 +120,7 @@ impl Matched {
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
         let mut warnings = check::warnings_of(&self.maps, self.range());
-        // Distant surfaces have matches, so pixels at the lower end of a found range are errors, not a
-        // clipped scene.
+        // Distant surfaces have sparse matches, so disparities at the lower end of a found range are errors.
         warnings.retain(|w| !self.range_found || !matches!(w, Warning::Clipped { upper: false, .. }));
         warnings
     }

@@ -53,8 +53,7 @@ impl Builder {
         self
     }
 
-    /// The largest number of threads of the CPU path; the default is the [usual](crate::threads::usual)
-    /// number.
+    /// The most threads of the CPU path; by default the [usual](crate::threads::usual) number.
     pub fn threads(mut self, threads: usize) -> Self {
         self.execution.threads = Some(threads);
         self
@@ -125,7 +124,7 @@ impl Matcher {
     /// A matcher of the preset `default`, on a GPU if there is one, else on the CPU path.
     ///
     /// # Errors
-    /// Those of [`Builder::build`].
+    /// The errors of [`Builder::build`].
     #[cfg(not(target_arch = "wasm32"))]
     pub fn new() -> Result<Self> {
         Self::builder().build()
@@ -229,7 +228,7 @@ impl Matcher {
     /// The failure of a device as a note, if the CPU path may replace it. The maps are the same there, so it only costs time.
     ///
     /// # Errors
-    /// The failure, if it may not.
+    /// The failure, if the CPU path may not replace the device.
     fn without_device(&mut self, failure: Error) -> Result<Error> {
         if !self.falls_back || !matches!(failure, Error::Device(_) | Error::Memory(_)) {
             return Err(failure);

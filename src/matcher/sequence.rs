@@ -15,8 +15,7 @@ use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 
 impl Matcher {
-    /// Matches pairs one after another, each over its range, and passes the results to `take`, in order,
-    /// until it breaks.
+    /// Matches pairs in order, each over its range, and passes each result to `take` until it breaks.
     ///
     /// While a device matches one pair, the graphs of the next are built and uploaded, and the maps of the
     /// previous one are downloaded, unless a pair is cut into tiles or matched at twice its size. The CPU path
@@ -24,8 +23,7 @@ impl Matcher {
     /// machine; `take` runs on its own thread there. With per-stage timing, pairs are matched one at a time.
     ///
     /// # Errors
-    /// The errors of [`Job::run`](super::Job::run), after the results of all pairs before have been passed
-    /// on.
+    /// The errors of [`Job::run`](super::Job::run), after the results of all earlier pairs.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run_all(
         &mut self,
@@ -35,12 +33,10 @@ impl Matcher {
         pollster::block_on(self.run_all_async(pairs, take))
     }
 
-    /// Like `run_all`, but ends with [`Error::Interrupted`](crate::Error::Interrupted) soon after `cancel`
-    /// becomes true.
+    /// Like `run_all`, but ends with [`Interrupted`](crate::Error::Interrupted) soon after `cancel` is set.
     ///
     /// # Errors
-    /// The errors of [`Job::run`](super::Job::run), after the results of all pairs before have been passed
-    /// on.
+    /// The errors of [`Job::run`](super::Job::run), after the results of all earlier pairs.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run_all_until(
         &mut self,
@@ -54,8 +50,7 @@ impl Matcher {
     /// Like `run_all`, for a browser: one pair at a time, and `take` on the only thread.
     ///
     /// # Errors
-    /// The errors of [`Job::run_async`](super::Job::run_async), after the results of all pairs before have
-    /// been passed on.
+    /// The errors of [`Job::run_async`](super::Job::run_async), after the results of all earlier pairs.
     pub async fn run_all_async(
         &mut self,
         pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,

@@ -19,7 +19,7 @@ impl SharedMatcher {
     /// Opens the device.
     ///
     /// # Errors
-    /// Those of [`Builder::build`].
+    /// The errors of [`Builder::build`].
     pub fn new(builder: Builder) -> Result<Self> {
         let threads = Arc::new(Threads::new(builder.execution.threads)?);
         let shared = Self { builder, threads, own: PerProcess::new() };
@@ -30,7 +30,7 @@ impl SharedMatcher {
     /// Runs `work` with the matcher, once no other thread uses it.
     ///
     /// # Errors
-    /// That of `work`, and in a forked process those of [`Builder::build`].
+    /// The error of `work`, and in a forked process the errors of [`Builder::build`].
     pub fn turn<T>(&self, work: impl FnOnce(&mut Matcher) -> Result<T>) -> Result<T> {
         let mut own = self.own.get().lock().unwrap_or_else(PoisonError::into_inner);
         let matcher = match own.take() {

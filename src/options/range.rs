@@ -56,8 +56,7 @@ impl DisparityRange {
     /// The range of the same surfaces in a pair of twice the size.
     ///
     /// # Errors
-    /// [`Error::Range`] when it is beyond [`MAX_LABELS`] or [`MAX_DISPARITY`]; the error names the limit
-    /// before doubling.
+    /// [`Error::Range`] beyond [`MAX_LABELS`] or [`MAX_DISPARITY`], with the limit before doubling.
     pub fn doubled(self) -> Result<Self> {
         let Self { min, max } = self;
         Self::new(2 * min, 2 * max).map_err(|error| match error {

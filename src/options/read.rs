@@ -35,7 +35,7 @@ impl Method {
     /// at the end, so that their order does not matter.
     ///
     /// # Errors
-    /// Those of [`Method::set`].
+    /// The errors of [`Method::set`].
     pub fn set_all<'a>(&mut self, pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<()> {
         // Bare words (`matching=sad`) are strings; everything else is TOML already.
         let value = |text: &str| match format!("value = {text}").parse::<toml::Table>() {

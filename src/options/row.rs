@@ -32,8 +32,7 @@ pub struct Key {
     /// The source: a section of the paper, with the paper's value, or other work. `open` means that the paper
     /// leaves the choice open.
     pub source: &'static str,
-    /// Whether the option only serves to reproduce other readings of the paper. Lists of options leave these
-    /// out unless asked.
+    /// Whether the option only reproduces other readings of the paper; lists leave these out unless asked.
     pub for_reproduction: bool,
 }
 
@@ -149,12 +148,11 @@ pub(super) const fn one_of(words: &'static [Word]) -> Takes {
 pub struct Word {
     /// The word as users write it: `ad-census`.
     pub word: &'static str,
-    /// What it means.
+    /// The meaning of the word.
     pub meaning: &'static str,
 }
 
-/// Declares a group of options: a struct with one field per row, its defaults, and `GROUP`, which describes
-/// it.
+/// Declares a group of options: a struct with a field per row, its defaults, and its description `GROUP`.
 ///
 /// A row reads: `/// meaning`, then `key: type = default, takes range, unit "..." (if any), source "...";`. A
 /// final `for reproduction` marks an option that only serves to reproduce other readings of the paper.
@@ -210,8 +208,7 @@ macro_rules! options {
     };
 }
 
-/// Declares the words that an option takes: an enum with one variant per word, and `WORDS`, which describes
-/// them.
+/// Declares the words of an option: an enum with a variant per word, and their descriptions `WORDS`.
 macro_rules! words {
     (
         $(#[doc = $about:literal])+

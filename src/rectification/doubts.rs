@@ -156,8 +156,7 @@ fn digits(number: f64) -> String {
 /// calibration for 3/4 of the size is off by an eighth.
 const FAR: f64 = 0.1;
 
-/// The doubt about `views`, for images of these `sizes`, that seem to be for another size of the rectified
-/// images.
+/// The doubt whether `views` belong to another size of the rectified images, given image `sizes`.
 pub(super) fn of_views(
     lenses: &[Lens; 2],
     views: &RectifiedViews,

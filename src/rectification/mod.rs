@@ -63,8 +63,7 @@ pub struct Rectification {
     doubts: Vec<Doubt>,
     /// Set if it comes from matches alone, without a scale.
     trust: Option<Trust>,
-    /// The source positions of the pixels of both rectified views, row by row, if they are
-    /// [kept](Self::keep_places).
+    /// The source positions for both rectified views, row by row, if [kept](Self::keep_places).
     places: Option<[Vec<Place>; 2]>,
 }
 
@@ -91,7 +90,7 @@ impl Rectification {
     /// size of the left images, unless the calibration has another.
     ///
     /// # Errors
-    /// Those of [`Rectification::new`].
+    /// The errors of [`Rectification::new`].
     pub fn of_sizes(
         calibration: &StereoCalibration,
         sizes: [(usize, usize); 2],
@@ -228,7 +227,7 @@ impl Rectification {
     /// [`Rectification::left`] and [`Rectification::right`] for every pixel: x, then y; +infinity where there is none.
     ///
     /// # Errors
-    /// [`Error::Memory`] when the system has not enough memory.
+    /// [`Error::Memory`] when the system has too little memory.
     pub fn maps(&self) -> Result<[[Plane<f32>; 2]; 2]> {
         let (width, height) = self.size();
         let values = (width as u64).saturating_mul(height as u64).saturating_mul(4);
@@ -246,7 +245,7 @@ impl Rectification {
     /// cameras. It takes 16 bytes per pixel, and does not change the result of [`Rectification::apply`].
     ///
     /// # Errors
-    /// [`Error::Memory`] when the system has not enough memory.
+    /// [`Error::Memory`] when the system has too little memory.
     pub fn keep_places(&mut self) -> Result<()> {
         let (width, height) = self.size();
         let of_view = |view: usize| {
@@ -276,7 +275,7 @@ impl Rectification {
     /// sixteen pixels around it that contribute is. A pair of 8-bit levels stays one.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] when the pair is of another size; [`Error::Memory`] when the system has not enough memory.
+    /// [`Error::Mismatch`] when the pair is of another size; [`Error::Memory`] when the system has too little memory.
     pub fn apply(&self, pair: &Pair) -> Result<Pair> {
         let (mut images, mut sizes) = ([pair.left(), pair.right()], pair.own_sizes());
         if self.exchanged {
@@ -346,8 +345,7 @@ impl Rectification {
     /// with the angle in radians as length: [`Turn::axis`](crate::drift::Turn::axis).
     ///
     /// # Errors
-    /// [`Error::Memory`] when it [keeps its places](Self::keep_places) and the machine has too little memory
-    /// for new ones.
+    /// [`Error::Memory`] if it [keeps its places](Self::keep_places) and memory is too small for new ones.
     pub fn with_right_turned(&self, axis: [f64; 3]) -> Result<Self> {
         let mut turned = Self { places: None, ..self.clone() };
         turned.views.rotations[1] = product(&rotation(axis), &self.views.rotations[1]);

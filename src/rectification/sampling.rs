@@ -24,7 +24,7 @@ pub(super) fn place(at: [f64; 2]) -> Place {
 /// if a masked or outside pixel contributes to it. With `bytes`, values are rounded to whole 8-bit levels.
 ///
 /// # Errors
-/// [`Error::Memory`](crate::Error::Memory) when the system has not enough memory.
+/// [`Error::Memory`](crate::Error::Memory) when the system has too little memory.
 pub(super) fn resample(
     image: &Image,
     (width, height): (usize, usize),

@@ -34,8 +34,7 @@ const FOCAL_LENGTH: f64 = 1.0;
 /// the focal length, and rotations of both views about an axis across the motion, poorly if disparities are
 /// nearly the same or a lens bends lines. They determine everything else so well that the prior does not count.
 const COST: f64 = 0.1;
-/// Standard deviations of the prior: of the logarithm of the focal length, of the rotations in radians, and
-/// of the forward share of the motion (open).
+/// Standard deviations of the priors: log of the focal length, rotation in radians, forward motion (open).
 const UNUSUAL: [f64; 3] = [1.0, 0.1, 0.2];
 
 /// Two views of one camera.
@@ -62,15 +61,13 @@ impl TwoViews {
         (width.max(height) as f64 / PARTS).max(LEAST)
     }
 
-    /// The geometry of views of `size` that most of the `matches` support; `None` if they are fewer than a
-    /// sample.
+    /// The geometry of views of `size` that most `matches` support; `None` of fewer than a sample.
     pub(super) fn estimate(matches: &[Correspondence], size: (usize, usize)) -> Option<Self> {
         if matches.len() < SAMPLE {
             return None;
         }
         let tolerance = Self::tolerance(size);
-        // Start from motion to the side, vertical, and forward. The last is no stereo pair, but must not pass
-        // for one.
+        // Start from sideways, vertical and forward motion; the last is detected as no stereo pair.
         let starts = [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
         let sampled = |i: u64| {
             let few = sample(matches.len(), i % SAMPLES).map(|i| matches[i]);

@@ -27,14 +27,14 @@ pub(super) fn choose(
         return error(if pose.rotation[2][2] > 0.0 {
             "has one camera on its side or upside down against the other; turn its images, and calibrate with these"
         } else {
-            "has cameras that look in directions more than 90 degrees apart; no pair comes of them"
+            "has cameras that look in directions more than 90 degrees apart; they cannot be rectified"
         });
     }
     let half = rotation(scaled(vector, -0.5));
     let t = rotated(&half, pose.translation);
     let axis = usize::from(t[0].abs() <= t[1].abs());
     if t[2].abs() > t[axis].abs() {
-        return error("has one camera in front of the other; no rectified pair comes of them");
+        return error("has one camera in front of the other; they cannot be rectified");
     }
     let mut goal = [0.0; 3];
     goal[axis] = t[axis].signum();

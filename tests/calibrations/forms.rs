@@ -258,8 +258,7 @@ pub(super) fn npz(arrays: &[(&str, &str, Vec<f64>)]) -> Vec<u8> {
             .concat();
         let name = format!("{name}.npy");
         let (size, length) = ((data.len() as u32).to_le_bytes(), (name.len() as u16).to_le_bytes());
-        // Version, flags, method, time, date, checksum, both sizes, lengths of the name and of NumPy's extra
-        // field.
+        // Version, flags, method, time, date, checksum, both sizes, lengths of the name and the extra field.
         let common = [&[20, 0, 0, 0, 0, 0, 0, 0, 33, 0, 0, 0, 0, 0][..], &size, &size, &length].concat();
         let at = (bytes.len() as u32).to_le_bytes();
         bytes.extend([b"PK\x03\x04", &common[..], &[4, 0], name.as_bytes(), &[0; 4], &data].concat());

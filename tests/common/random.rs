@@ -13,8 +13,7 @@ use mrfgs::options::{
 };
 use std::ops::Range;
 
-/// Random label windows for a level of `plan`: all labels, the same part everywhere, or parts that vary from
-/// run to run.
+/// Random label windows for a level of `plan`: all labels, the same part of them, or varying parts.
 pub fn windows(random: &mut Random, plan: &Plan, level: usize) -> Plane<[u16; 2]> {
     let l = &plan.levels[level];
     let all = l.stride as u16;

@@ -24,8 +24,7 @@ pub struct Lens {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Distortion {
-    /// Radial and tangential distortion as in OpenCV: `plumb_bob`, `rational_polynomial`, `radtan`; also with
-    /// thin prism and tilt.
+    /// OpenCV's lenses: `plumb_bob`, `radtan`, `rational_polynomial`, also with thin prism and tilt.
     RadialTangential(RadialTangential),
     /// Fisheye: the angle to the axis times a polynomial of its square, k1 to k4. OpenCV's `fisheye`,
     /// `equidistant`, the model of Kannala and Brandt.
@@ -80,8 +79,7 @@ impl Distortion {
         }
     }
 
-    /// The image radius of a point of the plane z = 1 at the distance `tangent` from the axis, before any
-    /// tangential part.
+    /// The image radius of a point at `tangent` from the axis in the plane z = 1, before tangential terms.
     fn radius(&self, tangent: f64) -> f64 {
         match *self {
             Self::RadialTangential(_) => tangent,
@@ -139,8 +137,7 @@ impl Distortion {
     }
 }
 
-/// The terms of a decentred lens and a thin prism that are added to a fisheye, for a point of the plane z =
-/// 1.
+/// The decentring and thin prism terms of a fisheye, for a point of the plane z = 1.
 fn of_prism(tangential: [f64; 2], prism: [f64; 2], at: [f64; 2]) -> [f64; 2] {
     let tangent = (at[0] * at[0] + at[1] * at[1]).sqrt();
     // The point of an ideal fisheye, whose radius is the angle.
@@ -149,8 +146,7 @@ fn of_prism(tangential: [f64; 2], prism: [f64; 2], at: [f64; 2]) -> [f64; 2] {
 }
 
 impl Lens {
-    /// A lens with the given horizontal and vertical focal lengths, principal point (all in pixels) and
-    /// distortion.
+    /// A lens with these focal lengths and principal point, in pixels, and this distortion.
     ///
     /// # Errors
     /// [`Error::Calibration`] when a number is not finite or a focal length not above 0.
@@ -256,8 +252,7 @@ impl Lens {
         at.map(|v| v * low / radius)
     }
 
-    /// Whether the lens is a fisheye or another wide model, whose image radius is not close to the tangent of
-    /// the angle.
+    /// Whether the image radius is not close to the tangent of the angle: fisheyes and other wide lenses.
     pub(crate) fn is_wide(&self) -> bool {
         !matches!(self.distortion, Distortion::RadialTangential(_))
     }

@@ -61,8 +61,7 @@ impl RadialTangential {
         Self { radial: [k1, k2, k3, k4, k5, k6], tangential: [p1, p2], ..Self::NONE }
     }
 
-    /// The model of p1, p2 and a thin prism whose horizontal and vertical shifts grow with the square of the
-    /// radius.
+    /// The model of p1, p2 and a thin prism with the quadratic shifts `s1` and `s3`.
     pub(super) fn thin_prism(tangential: [f64; 2], [across, down]: [f64; 2]) -> Self {
         Self { tangential, prism: [across, 0.0, down, 0.0], ..Self::NONE }
     }

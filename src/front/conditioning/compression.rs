@@ -93,7 +93,7 @@ impl Steps {
         }
     }
 
-    /// The same steps, all at one `place`.
+    /// All steps counted at one `place`.
     fn all_at(&self, place: usize) -> Self {
         let mut all = Self::default();
         (all.sums[place % BLOCK], all.counts[place % BLOCK]) =

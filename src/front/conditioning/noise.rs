@@ -15,13 +15,11 @@ const SMOOTHING: [(f64, f64); 3] = [(0.5, 1.0), (0.57, 0.7), (0.7, 0.5)];
 const RADIUS: usize = 4;
 const SIDE: usize = 2 * RADIUS + 1;
 const PIXELS: usize = SIDE * SIDE;
-/// Distance to either side of the expected position at which patches of the right view are compared, in
-/// pixels.
+/// The search radius for patches of the right view around their expected position, in pixels.
 const REACH: i32 = 3;
 /// Patches are compared if their disparity is this close to a whole number, in pixels, because interpolation smooths.
 const NEARLY_WHOLE: f64 = 0.2;
-/// Detail is limited to this many times its median, so that single wrong pixels, which smoothing would
-/// spread, do not matter.
+/// Detail is clamped to this many times its median, because smoothing would spread single wrong pixels.
 const MAX_DETAIL: i32 = 2;
 
 /// The standard deviation by which to smooth both views, from matches at half their size; 0 for none.

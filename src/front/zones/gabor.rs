@@ -112,7 +112,7 @@ impl Spectrum {
             let values = |x: usize| Lanes(group.map(|row: &[f32]| row[x]));
             lanes.clear();
             lanes.extend(
-                (0..width).chain((0..width).rev()).map(|x| Complex { re: values(x), im: Lanes::of(0.0) }),
+                (0..width).chain((0..width).rev()).map(|x| Complex { re: values(x), im: Lanes::splat(0.0) }),
             );
             across.process(lanes);
             for (i, out) in out.chunks_exact_mut(2 * width).enumerate() {

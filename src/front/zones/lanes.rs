@@ -17,8 +17,8 @@ pub(super) const LANES: usize = 4;
 pub(super) struct Lanes(pub(super) [f32; LANES]);
 
 impl Lanes {
-    /// The same number in each lane.
-    pub(super) fn of(value: f32) -> Self {
+    /// `value` in every lane.
+    pub(super) fn splat(value: f32) -> Self {
         Self([value; LANES])
     }
 
@@ -71,7 +71,7 @@ impl Neg for Lanes {
 impl Zero for Lanes {
     #[inline(always)]
     fn zero() -> Self {
-        Self::of(0.0)
+        Self::splat(0.0)
     }
 
     fn is_zero(&self) -> bool {
@@ -82,21 +82,21 @@ impl Zero for Lanes {
 impl One for Lanes {
     #[inline(always)]
     fn one() -> Self {
-        Self::of(1.0)
+        Self::splat(1.0)
     }
 }
 
 impl FromPrimitive for Lanes {
     fn from_i64(n: i64) -> Option<Self> {
-        f32::from_i64(n).map(Self::of)
+        f32::from_i64(n).map(Self::splat)
     }
 
     fn from_u64(n: u64) -> Option<Self> {
-        f32::from_u64(n).map(Self::of)
+        f32::from_u64(n).map(Self::splat)
     }
 
     fn from_f64(n: f64) -> Option<Self> {
-        f32::from_f64(n).map(Self::of)
+        f32::from_f64(n).map(Self::splat)
     }
 }
 
@@ -106,7 +106,7 @@ impl Num for Lanes {
     type FromStrRadixErr = <f32 as Num>::FromStrRadixErr;
 
     fn from_str_radix(text: &str, radix: u32) -> Result<Self, Self::FromStrRadixErr> {
-        f32::from_str_radix(text, radix).map(Self::of)
+        f32::from_str_radix(text, radix).map(Self::splat)
     }
 }
 

@@ -24,8 +24,7 @@ struct Moments {
 /// A plane through the moments: its value, its slopes, and whether it is trusted.
 type Fit = Option<(i64, [i64; 2], bool)>;
 
-/// Filled pixels take planes through measured ones, and so do measured pixels of little confidence that are
-/// far from their plane.
+/// Filled pixels and unsure measured ones far from their plane take planes through measured pixels.
 pub fn far_plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let refinement = &plan.method.refinement;
     let half = plan.method.schedule.match_size == MatchSize::Half;

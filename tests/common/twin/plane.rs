@@ -14,7 +14,7 @@ pub fn plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     through(plan, pair, maps, &window, |validity| changes(plan, validity));
 }
 
-/// The same for `touched` pixels, in another window.
+/// [`plane`] for the `touched` pixels, in any window.
 pub fn through(
     plan: &Plan,
     pair: &Pair,

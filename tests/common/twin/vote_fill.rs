@@ -26,8 +26,7 @@ fn sure(maps: &Finest, at: (usize, usize)) -> bool {
     !invalid(maps.validity[at]) && maps.confidence[at] >= VOTE_SURE as i32
 }
 
-/// Filled pixels take the vote of the most similar half-size pixel nearby, and outvoted ones that of their
-/// own.
+/// Filled pixels take the vote of the most similar half-size pixel, and outvoted ones that of their own.
 pub fn vote_fill(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     if plan.method.refinement.fill != Fill::Votes {
         return;
