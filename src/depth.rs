@@ -50,9 +50,8 @@ impl Rig {
         Ok(Self { camera, doffs, baseline, unit, to_original: None, frame: PointFrame::Matched })
     }
 
-    /// The same rig with the rotation of the original left camera, to which the pose of a third camera in
-    /// [`Rig::registered`] refers.
-    /// `rectifying` is the rotation from that camera to the rectified one, the first of
+    /// The rig with the rotation of the original left camera, to which third cameras in [`Rig::registered`]
+    /// refer. `rectifying` is the rotation from that camera to the rectified one, the first of
     /// [`Rectification::rotations`](crate::rectification::Rectification::rotations).
     #[must_use]
     pub fn rectified_by(self, rectifying: &Matrix) -> Self {

@@ -11,9 +11,8 @@ use std::sync::Arc;
 
 /// Any error of the library.
 ///
-/// [`Error::Option`], [`Error::Preset`], [`Error::Range`], [`Error::Execution`] and [`Error::Budget`] say
-/// that the request was wrong; [`Error::Device`] and [`Error::Memory`], that the machine cannot serve it. The
-/// others are about data.
+/// [`Error::Option`], [`Error::Preset`], [`Error::Range`], [`Error::Execution`] and [`Error::Budget`] are wrong
+/// requests; [`Error::Device`] and [`Error::Memory`] are limits of the machine; the others are about data.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

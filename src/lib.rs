@@ -73,8 +73,7 @@
 //! ```
 //!
 //! - [`Method`] holds every option that determines the bits of the maps; [`options`] describes them all.
-//! - [`Matched`] is the result of a match: maps of disparity, confidence and validity, and how they were
-//!   computed.
+//! - [`Matched`] is the result of a match: maps of disparity, confidence and validity, and their origin.
 //! - [`colour`] renders maps as pictures.
 //! - [`check`] warns of likely faults of a pair, and finds its disparity range.
 //! - [`calibration`] reads the calibrations of cameras, and [`rectification`] rectifies their images.

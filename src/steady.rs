@@ -10,7 +10,6 @@ use crate::maps::{FRACTION, Maps, flag, has_disparity};
 /// disparity is that of the frame alone, so moving objects leave no trail; with a moving camera, that is
 /// almost everywhere. Raw disparities, confidence, validity and the map of the right view do not change.
 ///
-///
 /// It works in integers, so the maps depend on the sequence alone, on every device.
 ///
 /// ```

@@ -113,7 +113,6 @@ fn a_sequence_equals_its_single_pairs() {
         assert!(down >= 12 * width * height && (matched.tiles.count() > 1 || down < 60 * width * height));
     }
     assert_same(found, &expected);
-    // Unfinished work does not affect the next sequence.
     let (result, found, log) = all(&mut matcher, pairs(), 2);
     result.unwrap();
     assert_eq!(log, "ask 0, ask 1, take 0, ask 2, take 1, ");

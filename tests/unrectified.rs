@@ -245,7 +245,6 @@ fn pairs_that_show_no_geometry_are_refused() {
     // A camera rotated on the spot, without baseline.
     assert_eq!(refused(&photographs(&scene.left, &scene.left)), RectificationError::Flat);
     assert_eq!(refused(&forward(&[&scene.left, &other.left], 0.06)), RectificationError::Forward);
-    // A single pixel.
     let dot = Plane::filled(1, 1, [9; 3]);
     let dot = Pair::new(Image::from_rgb8(&dot), Image::from_rgb8(&dot)).unwrap();
     assert!(matches!(refused(&dot), RectificationError::Few { .. }));

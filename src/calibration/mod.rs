@@ -139,8 +139,7 @@ pub fn read(files: &[PathBuf]) -> Result<StereoCalibration> {
 /// The text of a calibration file, for [`of_texts`]. Unpacks gzip, and turns the arrays of an `.npz` into lines.
 ///
 /// # Errors
-/// [`Error::Read`] when it cannot be read, is larger than any calibration, or is recognized as another kind
-/// of file, such as an image.
+/// [`Error::Read`] when it cannot be read, is too large, or is another kind of file, such as an image.
 pub fn text(file: &Path) -> Result<String> {
     let wrong = |reason: String| Error::read(file, reason);
     if file.is_dir() {

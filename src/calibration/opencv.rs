@@ -46,8 +46,7 @@ pub(super) fn has_lens(entries: &Entries) -> bool {
     CAMERA.iter().any(|names| entries.find(names).is_some())
 }
 
-/// Whether the entries are OpenCV's: whether there is any camera. Short names have other meanings too, so the
-/// value must be a matrix.
+/// Whether the entries are OpenCV's, by a matrix of a camera. A short name alone may mean something else.
 pub(super) fn is(entries: &Entries) -> bool {
     let mut all =
         CAMERA.iter().chain(&PROJECTION).chain(&DISTORTION).flat_map(|names| entries.find_all(names));

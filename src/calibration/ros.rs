@@ -65,8 +65,7 @@ struct Region {
 }
 
 impl Region {
-    /// From `roi`, `binning_x` and `binning_y`, for a `sensor` of this size. 0 means all of it, and every
-    /// pixel.
+    /// From `roi`, `binning_x` and `binning_y`, for a `sensor` of this size. 0 means all, and every pixel.
     fn read(entries: &Entries, sensor: (usize, usize)) -> Result<Self> {
         let count = |of: &Entries, names: &str| Ok::<_, Error>(of.number_or_zero(names)? as usize);
         let binning = [count(entries, "binningx")?.max(1), count(entries, "binningy")?.max(1)];

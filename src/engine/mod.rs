@@ -115,8 +115,7 @@ pub struct MatchRun {
     /// Whether the pair is at twice its size.
     doubled: bool,
     mosaic: Option<Mosaic>,
-    /// After all tiles are placed: the CPU path for the stages on the maps of the whole image, and the
-    /// disparities of the right view.
+    /// After all tiles: the CPU path for the stages on whole maps, and the disparities of the right view.
     gathered: Option<(Cpu, Plane<i32>)>,
     tickets: Vec<(View, Ticket)>,
     /// The maps that were found so far.

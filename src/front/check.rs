@@ -374,8 +374,7 @@ pub fn warnings(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     out
 }
 
-/// The damage to the files of `pair`, reported once if both views are from one file: only
-/// [`Warning::Damaged`], without looking at pixels.
+/// [`Warning::Damaged`] for the files of `pair`, once if both views are from one file. Reads no pixels.
 #[must_use]
 pub fn damaged(pair: &Pair) -> Vec<Warning> {
     let mut doubts: Vec<_> = pair.doubts().iter().flatten().collect();

@@ -67,8 +67,7 @@ impl Halves {
                 && path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("jps"));
             return Ok(is_jps.then_some(Self { above: false, left_first: false, is_said: false }));
         };
-        // After the signature and two bytes: the separation of the views, flags, the layout, and whether it
-        // is a pair at all.
+        // After the signature and two bytes: separation of the views, flags, layout, and the kind of file.
         match bytes[body].get(JPS.len() + 2..).and_then(<[u8]>::first_chunk) {
             Some(&[_, flags, layout @ (2 | 3), 1]) => {
                 Ok(Some(Self { above: layout == 3, left_first: flags & 4 != 0, is_said: true }))

@@ -244,8 +244,7 @@ impl Calibration {
         Ok(calibration)
     }
 
-    /// Checks that the right camera is the left one moved by `doffs` along the rows, as in a rectified pair.
-    /// The error says what differs.
+    /// Checks that the right camera is the left one moved by `doffs` along the rows, or says what differs.
     fn check_right(&self, right: Camera) -> std::result::Result<(), String> {
         // Tolerates the rounding of files.
         const ROUNDING: f64 = 0.05;

@@ -40,8 +40,7 @@ impl SharedMatcher {
         work(own.insert(matcher))
     }
 
-    /// Runs `work` related to a match of `pair` on the matcher's threads, such as [checks](crate::check),
-    /// without waiting for running matches.
+    /// Runs `work` for `pair`, such as [checks](crate::check), on the matcher's threads, without waiting.
     ///
     /// # Errors
     /// [`ExecutionError`](crate::error::ExecutionError) if the system does not start the threads.

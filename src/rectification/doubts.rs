@@ -152,8 +152,7 @@ fn digits(number: f64) -> String {
     if after == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').into() }
 }
 
-/// Largest plausible distance from the middle as a share of the size. Cameras are within a twentieth; a
-/// calibration for 3/4 of the size is off by an eighth.
+/// Suspect distance from the middle, by size: cameras are within 1/20; a calibration for 3/4 of it gives 1/8.
 const FAR: f64 = 0.1;
 
 /// The doubt whether `views` belong to another size of the rectified images, given image `sizes`.

@@ -217,8 +217,7 @@ impl Rectification {
         self.source(0, x, y)
     }
 
-    /// The position in the right image of the point (x, y) of the rectified right view; see
-    /// [`Rectification::left`].
+    /// Like [`Rectification::left`], for the right view.
     #[must_use]
     pub fn right(&self, x: f64, y: f64) -> Option<[f64; 2]> {
         self.source(1, x, y)

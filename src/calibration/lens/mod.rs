@@ -232,8 +232,7 @@ impl Lens {
         }
     }
 
-    /// The point of the plane z = 1 whose image is `at`, for a radial model; a point at the edge of the valid
-    /// field if it lies beyond.
+    /// The point of the plane z = 1 with the image `at` in a radial model, or one at the edge of the field.
     fn at_radius(&self, at: [f64; 2]) -> [f64; 2] {
         let radius = (at[0] * at[0] + at[1] * at[1]).sqrt();
         if radius <= 1e-12 {
