@@ -1,4 +1,4 @@
-//! Maps as pictures.
+//! Renders maps as pictures.
 
 use crate::image::Plane;
 use crate::maps::{flag, has_disparity};
@@ -24,7 +24,7 @@ pub enum ColourMap {
 }
 
 impl ColourMap {
-    /// Its colours in equal steps, from far to near.
+    /// The colours at equal steps, from far to near.
     fn stops(self) -> &'static [Rgb] {
         match self {
             Self::Turbo => &[
@@ -195,8 +195,8 @@ pub fn validity(map: &Plane<u8>) -> Plane<[u8; 3]> {
     picture
 }
 
-/// A picture with one colour per pixel, and below it the colours from `min` to `max` by their position from 0
-/// to 1.
+/// A picture with one colour per pixel above a scale bar from `min` to `max`; `ramp` gives the bar's colour
+/// at a position from 0 to 1.
 fn with_scale(
     (w, h): (usize, usize),
     pixel: impl Fn(usize, usize) -> Rgb,
@@ -242,7 +242,7 @@ fn between(stops: &[Rgb], t: f64) -> Rgb {
     [0, 1, 2].map(|c| (stops[i][c] as f64 * (1.0 - part) + stops[i + 1][c] as f64 * part).round() as u8)
 }
 
-/// The values to mark on the scale, with their texts: as many round numbers as fit without touching.
+/// The values to mark on the scale, with their labels: as many round numbers as fit without touching.
 fn ticks(min: f64, max: f64, width: usize, s: usize) -> Vec<(f64, String)> {
     let range = max - min;
     if !(range.is_finite() && range > 0.0) {
@@ -254,7 +254,7 @@ fn ticks(min: f64, max: f64, width: usize, s: usize) -> Vec<(f64, String)> {
         let ticks: Vec<_> = (0..=10)
             .map(|k| (first + k as f64) * step)
             .take_while(|v| *v <= max)
-            // The sum turns -0 into 0.
+            // Adding 0 turns -0 into 0.
             .map(|v| (v, format!("{:.decimals$}", v + 0.0)))
             .collect();
         let widest = ticks.iter().map(|(_, text)| text_width(text, s)).max().unwrap_or(width + 1);
@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn lightness_rises_where_it_says_so() {
+    fn lightness_rises_in_viridis_and_grey() {
         for colours in [ColourMap::Viridis, ColourMap::Grey] {
             let light = |i| {
                 let [r, g, b] = between(colours.stops(), i as f64 / 100.0).map(f64::from);
@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_stand_side_by_side() {
+    fn pictures_are_joined_side_by_side() {
         let (left, right) = (Plane::filled(2, 1, WHITE), Plane::filled(1, 3, GREY));
         let both = side_by_side(&left, &right);
         assert_eq!(both.size(), (3, 3));
@@ -371,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn no_size_and_no_range_panics() {
+    fn extreme_sizes_and_ranges_do_not_panic() {
         let values =
             [0.0, -0.0, 1.0, 1e-30, f32::MIN, f32::MAX, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 64.0];
         for (w, h) in [(0, 0), (0, 3), (3, 0), (1, 1), (1, 9), (2, 1), (59, 2), (60, 1), (401, 3), (4000, 1)]
@@ -416,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_have_a_sign_and_none_has_no_colour() {
+    fn errors_are_coloured_by_sign_and_size() {
         let (inf, nan) = (f32::INFINITY, f32::NAN);
         let truth = Plane::new(7, 1, vec![10.0, 10.0, 10.0, 10.0, inf, inf, 10.0]);
         let estimate = Plane::new(7, 1, vec![6.0, 10.0, 14.0, inf, 10.0, nan, 99.0]);
@@ -431,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn validity_shows_the_first_reason_and_what_stays_open() {
+    fn validity_shows_the_first_reason_and_dims_missing_disparities() {
         let flags = [0, 1 | 16, 2 | 16, 2, 4 | 2 | 16, 8, 32, 4 | 16, 64, 128 | 16];
         let picture = validity(&Plane::new(10, 1, flags.to_vec()));
         let colours = VALIDITY.map(|entry| entry.1);

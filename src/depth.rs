@@ -8,7 +8,7 @@ use crate::calibration::cameras::{Pose, ThirdCamera};
 use crate::calibration::matrix::{Matrix, rotated, transposed};
 use crate::error::{Error, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
-use crate::image::cloud::{Cloud, Frame, Point};
+use crate::image::cloud::{Cloud, Point, PointFrame};
 use crate::image::{Image, Plane};
 use crate::maps::{FRACTION, Maps};
 use crate::registration;
@@ -20,10 +20,10 @@ pub struct Rig {
     doffs: f64,
     baseline: f64,
     unit: Unit,
-    /// The rotation from the frame of the rectified left camera to that of the original one, where that is another one.
+    /// The rotation from the rectified left camera to the original one, where they differ.
     to_original: Option<Matrix>,
-    /// The frame of points.
-    frame: Frame,
+    /// The frame of the points.
+    frame: PointFrame,
 }
 
 impl Rig {
@@ -47,21 +47,21 @@ impl Rig {
         if baseline <= 0.0 {
             return error(format!("baseline={baseline} is not above 0; give the distance of the cameras"));
         }
-        Ok(Self { camera, doffs, baseline, unit, to_original: None, frame: Frame::Matched })
+        Ok(Self { camera, doffs, baseline, unit, to_original: None, frame: PointFrame::Matched })
     }
 
-    /// The same rig, which knows how the original left camera looks: [`Rig::registered`] takes a third camera's pose from there.
-    /// `rectifying` is the rotation from the frame of that camera to the rectified one, the first of
+    /// The rig with the rotation of the original left camera, to which third cameras in [`Rig::registered`]
+    /// refer. `rectifying` is the rotation from that camera to the rectified one, the first of
     /// [`Rectification::rotations`](crate::rectification::Rectification::rotations).
     #[must_use]
     pub fn rectified_by(self, rectifying: &Matrix) -> Self {
         Self { to_original: Some(transposed(rectifying)), ..self }
     }
 
-    /// The same, with points in the frame of the original left camera. Depths stay those along the axis of the rectified camera.
+    /// The same rig, with points in the frame of the original left camera. Depths stay along the axis of the rectified camera.
     #[must_use]
     pub fn in_original_frame(self, rectifying: &Matrix) -> Self {
-        Self { frame: Frame::Original, ..self.rectified_by(rectifying) }
+        Self { frame: PointFrame::Original, ..self.rectified_by(rectifying) }
     }
 
     /// The rig of a part of the images, whose first pixel is (x, y).
@@ -81,7 +81,7 @@ impl Rig {
         (apart > 0.0 && d.is_finite() && depth.is_finite()).then_some(depth)
     }
 
-    /// The disparity, in pixels, of what is at `depth` along the optical axis, in the unit of the baseline: the other way round.
+    /// The disparity, in pixels, at `depth` along the optical axis, in the unit of the baseline: the inverse of [`Rig::depth`].
     #[must_use]
     pub fn disparity(&self, depth: f64) -> f64 {
         self.baseline * self.camera.focal_length[0] / depth - self.doffs
@@ -93,16 +93,16 @@ impl Rig {
     #[must_use]
     pub fn point(&self, x: f64, y: f64, d: f64) -> Option<[f64; 3]> {
         let point = self.matched(x, y, d)?;
-        Some(if self.frame == Frame::Original { self.original(point) } else { point })
+        Some(if self.frame == PointFrame::Original { self.original(point) } else { point })
     }
 
-    /// The same in the frame of the rectified left camera.
+    /// [`Rig::point`] in the frame of the rectified left camera.
     fn matched(&self, x: f64, y: f64, d: f64) -> Option<[f64; 3]> {
         let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.camera;
         self.depth(d).map(|z| [(x - cx) * z / fx, (y - cy) * z / fy, z])
     }
 
-    /// A point of that frame in the one of the original left camera.
+    /// Rotates a point from the frame of the rectified left camera to that of the original one.
     fn original(&self, point: [f64; 3]) -> [f64; 3] {
         self.to_original.map_or(point, |matrix| rotated(&matrix, point))
     }
@@ -113,15 +113,15 @@ impl Rig {
         disparities.map(|&d| self.depth(f64::from(d)).map_or(f32::INFINITY, |depth| depth as f32))
     }
 
-    /// The error to expect of the depth at disparity `d`, whose own error is `sigma` (both in pixels), in the unit of the baseline: to
-    /// first order the depth Z moves by Z sigma / (d + doffs). `None` where [`Rig::depth`] is `None`.
+    /// The expected error of the depth at disparity `d`, whose own error is `sigma` (both in pixels), in the unit of
+    /// the baseline: Z sigma / (d + doffs) to first order, where Z is the depth. `None` where [`Rig::depth`] is `None`.
     #[must_use]
     pub fn depth_sigma(&self, d: f64, sigma: f64) -> Option<f64> {
         self.depth(d).map(|depth| depth * sigma / (d + self.doffs))
     }
 
-    /// The errors to expect of the depths of a map, from its disparities and [theirs](crate::sigma); +infinity where there is no depth, or
-    /// no finite error.
+    /// The expected errors of the depths of a map, from its disparities and [their errors](crate::sigma);
+    /// +infinity where there is no depth, or no finite error.
     ///
     /// # Panics
     /// When the maps differ in size.
@@ -141,19 +141,19 @@ impl Rig {
         self.unit
     }
 
-    /// The depths of a map of disparities in whole millimetres, as ROS and TUM have them: 0 where there is no depth, and
-    /// where it rounds to 0 or to more than 65535. `None` where the unit of the baseline is not known.
+    /// The depths of a map of disparities in whole millimetres, as in ROS and TUM: 0 where there is no depth,
+    /// or where it rounds to 0 or to more than 65535. `None` where the unit of the baseline is unknown.
     #[must_use]
     pub fn millimetres(&self, disparities: &Plane<f32>) -> Option<Plane<u16>> {
         let unit = self.unit.millimetres()?;
         Some(disparities.map(|&d| whole(self.depth(f64::from(d)).map_or(0.0, |depth| depth * unit))))
     }
 
-    /// The depths of a map of disparities as a third camera sees them: along its axis, at its pixels, in the unit of the baseline.
-    /// +infinity where it sees what the map does not. The nearest of several surfaces counts, and each pixel of the map covers what it
-    /// covers there. Where both units are known, that of the camera is turned into that of the baseline.
+    /// The depths of a map of disparities as a third camera sees them: along its axis, at its pixels, in the unit of the baseline,
+    /// and +infinity where the map shows nothing. Of several surfaces the nearest counts, and each pixel of the map covers its own
+    /// footprint. If both units are known, that of the camera's pose is converted.
     ///
-    /// The camera's pose is that to the original left camera where the rig [knows it](Rig::rectified_by), else that to the rectified one.
+    /// The camera's pose is relative to the original left camera if the rig [knows it](Rig::rectified_by), else to the rectified one.
     #[must_use]
     pub fn registered(&self, disparities: &Plane<f32>, camera: &ThirdCamera) -> Plane<f32> {
         let per_unit =
@@ -165,7 +165,7 @@ impl Rig {
         })
     }
 
-    /// Those [registered](Rig::registered) depths in whole millimetres, as [`Rig::millimetres`].
+    /// The [registered](Rig::registered) depths in whole millimetres, like [`Rig::millimetres`].
     #[must_use]
     pub fn registered_millimetres(
         &self,
@@ -177,9 +177,8 @@ impl Rig {
         Some(self.registered(disparities, camera).map(millimetres))
     }
 
-    /// The points that were measured and are trusted (validity 0), row by row, with the colours of the `left`
-    /// image. Filled pixels and pixels of low confidence are guesses from their surroundings, and give no
-    /// points.
+    /// The points with validity 0, measured and trusted, row by row, with the colours of the `left` image.
+    /// Filled pixels and pixels of low confidence are guesses from their surroundings, and give no points.
     ///
     /// # Panics
     /// When maps and image differ in size.
@@ -258,7 +257,7 @@ mod tests {
             let rig = Rig::new(&Calibration { unit, ..calibration() }).unwrap();
             rig.millimetres(&Plane::new(map.len(), 1, map.to_vec())).map(Plane::into_data)
         };
-        // 160,000 over 80, 100,000 (1.6, rounded), 4, 2, and what has no depth.
+        // 160,000 over 80, 100,000 (1.6, rounded), 4 and 2; then two disparities without a depth.
         let map = [60.0, 99_980.0, -16.0, -18.0, -20.0, f32::INFINITY];
         assert_eq!(millimetres(Unit::Millimetre, &map), Some(vec![2000, 2, 40_000, 0, 0, 0]));
         assert_eq!(millimetres(Unit::Centimetre, &map[..2]), Some(vec![20_000, 16]));
@@ -275,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_is_measured_and_trusted_is_a_point() {
+    fn only_measured_and_trusted_pixels_are_points() {
         let rig = Rig::new(&calibration()).unwrap();
         let validity = vec![0, flag::LOW_CONFIDENCE, flag::OCCLUDED | flag::FILLED, flag::MASKED, 0, 0];
         let maps = Maps {
@@ -288,19 +287,19 @@ mod tests {
         let left = Image::from_rgb8(&Plane::from_fn(6, 1, |x, _| [x as u8, 10, 20]));
         let cloud = rig.cloud(&maps, &left);
         let point = |position, red, confidence| Point { position, colour: [red, 10, 20], confidence };
-        // The fifth is at infinity.
+        // The fifth pixel is at infinity.
         let expected = [point([-4.0, -4.0, 2000.0], 0, 200), point([15.0, -10.0, 5000.0], 5, 255)];
-        assert_eq!((&cloud.points[..], cloud.frame), (&expected[..], Frame::Matched));
-        // A quarter turn about the axis: the right of the rectified camera is the down of the original one.
+        assert_eq!((&cloud.points[..], cloud.frame), (&expected[..], PointFrame::Matched));
+        // A quarter turn about the axis: right in the rectified camera is down in the original one.
         let turned = rig.in_original_frame(&[[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
         let cloud = turned.cloud(&maps, &left);
         let expected = [point([4.0, -4.0, 2000.0], 0, 200), point([10.0, 15.0, 5000.0], 5, 255)];
-        assert_eq!((&cloud.points[..], cloud.frame), (&expected[..], Frame::Original));
+        assert_eq!((&cloud.points[..], cloud.frame), (&expected[..], PointFrame::Original));
         assert_eq!(turned.depth(60.0), rig.depth(60.0));
     }
 
     #[test]
-    fn what_is_missing_is_named() {
+    fn missing_keys_are_named() {
         let refused = |change: fn(&mut Calibration), words: &[&str]| {
             let mut calibration = calibration();
             change(&mut calibration);

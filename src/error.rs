@@ -1,7 +1,7 @@
-//! What can go wrong, in types.
+//! The errors of the library, as types.
 //!
-//! Each error says in plain words what is wrong, with its names and numbers. The remedy is often a flag or an argument
-//! of the front end that was used, which this library does not know: a front end matches on the cause, and adds its
+//! Each error says in plain words what is wrong, with its names and numbers. The remedy is often a flag or an
+//! argument of a front end, which this library does not know: a front end matches on the cause and adds its
 //! own words.
 
 use std::fmt;
@@ -9,10 +9,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What can go wrong.
+/// Any error of the library.
 ///
-/// The request was wrong: [`Error::Option`], [`Error::Preset`], [`Error::Range`], [`Error::Execution`] and
-/// [`Error::Budget`]. The machine cannot serve it: [`Error::Device`] and [`Error::Memory`]. The others are about data.
+/// [`Error::Option`], [`Error::Preset`], [`Error::Range`], [`Error::Execution`] and [`Error::Budget`] are wrong
+/// requests; [`Error::Device`] and [`Error::Memory`] are limits of the machine; the others are about data.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -21,7 +21,7 @@ pub enum Error {
     Read {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         #[source]
         cause: ReadError,
     },
@@ -30,7 +30,7 @@ pub enum Error {
     Write {
         /// The file.
         path: PathBuf,
-        /// What went wrong.
+        /// The reason.
         #[source]
         reason: Reason,
     },
@@ -39,7 +39,7 @@ pub enum Error {
     Option {
         /// The key, such as `levels`.
         key: String,
-        /// What is wrong with it.
+        /// The cause.
         #[source]
         cause: OptionError,
     },
@@ -54,25 +54,25 @@ pub enum Error {
     /// The range of disparities makes no sense, or none can be found.
     #[error("disparity range: {0}")]
     Range(#[from] RangeError),
-    /// What should run the match makes no sense, or is not there.
+    /// The device or the threads that were asked for are invalid or do not exist.
     #[error(transparent)]
     Execution(#[from] ExecutionError),
-    /// The memory that the method grants to a match is too little for what is asked.
+    /// The memory that the method grants to a match is too small.
     #[error(transparent)]
     Budget(#[from] BudgetError),
-    /// A calibration lacks what depth needs, or makes no sense.
+    /// A calibration lacks a value that depth needs, or makes no sense.
     #[error("the calibration {0}")]
     Calibration(String),
     /// The pair cannot be rectified by its own matches.
     #[error("the pair cannot be rectified by its matches: {0}")]
     Rectification(#[from] RectificationError),
-    /// Images, masks or maps that belong together do not fit each other.
+    /// Images, masks, maps or regions do not fit together.
     #[error("{0}")]
     Mismatch(String),
-    /// There is no device, or the one that there is failed.
+    /// There is no device, or the device failed.
     #[error(transparent)]
     Device(#[from] DeviceError),
-    /// The machine or the device has not enough memory.
+    /// The machine or the device has too little memory.
     #[error(transparent)]
     Memory(#[from] MemoryError),
     /// The caller asked to stop.
@@ -100,7 +100,7 @@ pub enum ReadError {
         /// Most pixels that are read.
         limit: u64,
     },
-    /// Whole numbers were read as a disparity map, and nothing tells their scale.
+    /// A disparity map was read from whole numbers, whose scale is unknown.
     #[error(
         "holds whole numbers, which do not tell the scale of its disparities; disparity maps are .pfm, float .tif or .npy, or \
          16-bit .png with disparity times 256"
@@ -109,31 +109,31 @@ pub enum ReadError {
     /// A scale was given for a disparity map of floats.
     #[error("holds disparities in pixels, and only whole numbers need a scale")]
     NeedlessScale,
-    /// The file says which value stands for no data, but not as a number.
+    /// The file's no-data value is not a number.
     #[error("has the no-data value {value}, which is no number")]
     NoData {
-        /// What it says.
+        /// The value in the file.
         value: String,
     },
     /// There is not enough memory to read it.
     #[error(transparent)]
     Memory(#[from] MemoryError),
-    /// It is a file of options, one of which makes no sense.
+    /// It is a file of options, and one of them is invalid.
     #[error("{}{key}: {cause}", line.map_or(String::new(), |line| format!("line {line}: ")))]
     Option {
         /// The line, from 1, where it is known.
         line: Option<usize>,
         /// The key.
         key: String,
-        /// What is wrong with it.
+        /// The cause.
         cause: OptionError,
     },
-    /// Anything else, in words that say what to do where there is something to do.
+    /// Any other cause, with the remedy if there is one.
     #[error(transparent)]
     Other(Reason),
 }
 
-/// What went wrong, in words; its [source](std::error::Error::source) is the error of the system behind them, if there is one.
+/// The cause of an error in words; its [source](std::error::Error::source) is the error of the system, if there is one.
 #[derive(Clone, Debug)]
 pub struct Reason {
     text: String,
@@ -142,23 +142,23 @@ pub struct Reason {
 }
 
 impl Reason {
-    /// Other words for an error of the system.
-    pub fn of(error: io::Error, words: impl Into<String>) -> Self {
+    /// Describes an error of the system in other words.
+    pub fn from_io(error: io::Error, words: impl Into<String>) -> Self {
         Self { text: words.into(), io: Some(error.into()), of_request: false }
     }
 
-    /// Why nothing could serve what was asked for, whatever the machine: a name whose extension says no format.
+    /// The request cannot be served on any machine, such as a name whose extension is no format.
     pub fn of_request(words: impl Into<String>) -> Self {
         Self { of_request: true, ..words.into().into() }
     }
 
-    /// Whether what was asked for makes no sense.
+    /// Whether the request itself makes no sense.
     #[must_use]
     pub fn is_of_request(&self) -> bool {
         self.of_request
     }
 
-    /// The same error in the words that `f` makes of its own.
+    /// Replaces the text by `f` of it.
     #[must_use]
     pub fn reworded(self, f: impl FnOnce(&str) -> String) -> Self {
         Self { text: f(&self.text), ..self }
@@ -177,7 +177,7 @@ impl std::error::Error for Reason {
     }
 }
 
-/// By their words.
+/// Compares the texts.
 impl PartialEq for Reason {
     fn eq(&self, other: &Self) -> bool {
         self.text == other.text
@@ -199,11 +199,11 @@ impl From<&str> for Reason {
 impl From<io::Error> for Reason {
     fn from(error: io::Error) -> Self {
         let text = in_words(&error);
-        Self::of(error, text)
+        Self::from_io(error, text)
     }
 }
 
-/// An error of the system for people: without its number, and without the names that Rust has for kinds of errors.
+/// The text of a system error for users: without its number and without Rust's names for kinds of errors.
 #[must_use]
 pub fn in_words(error: &io::Error) -> String {
     let text = error.to_string();
@@ -225,14 +225,14 @@ impl<T: Into<Reason>> From<T> for ReadError {
     }
 }
 
-/// What is wrong with a key of a [`Method`](crate::options::Method).
+/// An error in a key of a [`Method`](crate::options::Method).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OptionError {
     /// There is no such key.
     #[error("there is no such key")]
     Unknown,
-    /// The group has no such key, but another one has.
+    /// The key belongs to another group.
     #[error("there is no such key; it is `{key}`")]
     InGroup {
         /// The key with its own group: `cost.sad-window`.
@@ -276,7 +276,7 @@ pub enum OptionError {
     },
 }
 
-/// What is wrong with a range of disparities; all numbers are in pixels.
+/// An error in a range of disparities; all numbers are in pixels.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RangeError {
@@ -316,7 +316,7 @@ pub enum RangeError {
         /// The width of the images.
         width: usize,
     },
-    /// No range was given, and the sparse matches are too few to find it; once the pair is rectified by its own matches, they are enough.
+    /// No range was given, and the sparse matches are too few to find it. After rectification by its own matches, the pair has enough.
     #[error(
         "the views have too few matches on the same rows to find the range of disparities, because they are not rectified"
     )]
@@ -324,7 +324,7 @@ pub enum RangeError {
     /// No range was given, and the sparse matches are too few to find it.
     #[error("the views have too few matches to find the range of disparities{}", after_colon(cause.as_deref()))]
     NotFound {
-        /// Why, and what to mend, where the pair itself is at fault.
+        /// The reason, with its remedy, where the pair itself is at fault.
         cause: Option<String>,
     },
 }
@@ -337,7 +337,7 @@ fn after_colon(cause: Option<&str>) -> String {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RectificationError {
-    /// Too few matches agree on how the cameras stood.
+    /// Too few matches agree on the pose of the cameras.
     #[error("{agreeing} of {matches} agree on how the camera moved, and {least} are needed, and half of all")]
     Few {
         /// Matches that agree.
@@ -347,7 +347,7 @@ pub enum RectificationError {
         /// Fewest that are needed.
         least: usize,
     },
-    /// One plane explains all matches, or a turn of the camera on the spot.
+    /// All matches fit one plane, or a camera that only rotated.
     #[error("they show no depth, but one flat surface, or a camera that turned on the spot")]
     Flat,
     /// The camera moved forward or backward.
@@ -355,7 +355,7 @@ pub enum RectificationError {
     Forward,
 }
 
-/// What is wrong with an [`Execution`](crate::options::Execution).
+/// An error in an [`Execution`](crate::options::Execution).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExecutionError {
@@ -367,7 +367,7 @@ pub enum ExecutionError {
         /// The devices, each as `index: name`.
         present: Vec<String>,
     },
-    /// Not so many threads as there may be.
+    /// The number of threads is outside its limits.
     #[error("{wanted} threads cannot be had; give 1 to {most}")]
     ThreadCount {
         /// How many were asked for.
@@ -375,17 +375,17 @@ pub enum ExecutionError {
         /// The largest number.
         most: usize,
     },
-    /// The system does not start the threads.
+    /// The system refuses to start the threads.
     #[error("the threads cannot be started: {0}")]
     Threads(String),
-    /// What is to be used was in use when this process was forked, by a thread that the process does not have.
+    /// When this process was forked, another thread of the parent was using the object.
     #[error(
         "another thread was using this when the process was forked, so that it is lost here: make it anew"
     )]
     Forked,
 }
 
-/// For what the memory that a method grants to a match is too little; all sizes are in MiB.
+/// The memory that a method grants is too little; all sizes are in MiB.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BudgetError {
@@ -403,20 +403,20 @@ pub enum BudgetError {
         height: usize,
         /// Labels of the range.
         labels: usize,
-        /// The least that would do.
+        /// The least memory that suffices.
         needed: u64,
     },
-    /// The steps of a match are inspected, and the memory does not hold all of its volumes.
+    /// The steps of a match are inspected, and the memory does not hold all its volumes.
     #[error(
         "only a match in one piece with all of its volumes in memory can show its steps: that needs {needed} MiB"
     )]
     Steps {
-        /// What would do.
+        /// The memory that suffices.
         needed: u64,
     },
 }
 
-/// Why a device does not do the job.
+/// Why a device cannot run a match.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeviceError {
@@ -424,18 +424,18 @@ pub enum DeviceError {
     #[cfg_attr(not(target_arch = "wasm32"), error("no Vulkan or Metal driver found"))]
     #[cfg_attr(target_arch = "wasm32", error("this browser shows no GPU"))]
     NoDriver,
-    /// The process was forked from one that has used drivers, which cannot be used any more then.
+    /// The process was forked from one that had used the drivers, which makes them unusable.
     #[error(
         "no device can be opened in this process, which was forked from one that has opened or looked for devices"
     )]
     Forked,
-    /// The device gets a small test pair wrong.
+    /// The device gives wrong maps for a small test pair.
     #[error("{name} disagrees with the CPU path on the self-test")]
     WrongMaps {
         /// The device.
         name: String,
     },
-    /// The job takes more iterations of a loop than a driver can be trusted with.
+    /// The match needs more iterations of a loop than is safe with a driver.
     #[error(
         "{width} x {height} pixels and {labels} labels with {neighbours} neighbours are too many for one invocation of \
          the shader `{shader}`"
@@ -457,52 +457,52 @@ pub enum DeviceError {
     Failed {
         /// The device.
         name: String,
-        /// What its driver says, in one line.
+        /// The message of its driver, in one line.
         reason: String,
     },
 }
 
-/// What there is not enough memory for; all sizes are in bytes.
+/// Why there is not enough memory; all sizes are in bytes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MemoryError {
-    /// The machine has too little, or does not let this process have it.
+    /// The machine has too little memory, or denies it to this process.
     #[error(
         "{} of memory are needed and {}",
         size(*needed),
         available.map_or("cannot be had".into(), |free| format!("{} are free", size(free)))
     )]
     Machine {
-        /// What is needed.
+        /// Bytes that are needed.
         needed: u64,
-        /// What is free, where the system says so.
+        /// Bytes that are free, if the system tells.
         available: Option<u64>,
-        /// What needs it.
+        /// The purpose of the memory.
         purpose: Purpose,
     },
-    /// The device has too little for the match.
+    /// The device has too little memory for the match.
     #[error("the match needs {} of memory and {name} has {}", size(*needed), size(*available))]
     Device {
         /// The device.
         name: String,
-        /// What is needed.
+        /// Bytes that are needed.
         needed: u64,
-        /// What the device has.
+        /// Bytes that the device has.
         available: u64,
     },
-    /// The device does not allow one buffer, or one view of it, to be so large.
+    /// A buffer, or one binding of it, is larger than the device allows.
     #[error("a buffer for {what} takes {} and {name} allows {}", size(*needed), size(*allowed))]
     Buffer {
         /// The device.
         name: String,
-        /// What the buffer holds.
+        /// The contents of the buffer.
         what: String,
-        /// What is needed.
+        /// Bytes that are needed.
         needed: u64,
-        /// Most that the device allows.
+        /// The largest size that the device allows.
         allowed: u64,
     },
-    /// The device ran out of memory on the way.
+    /// The device ran out of memory during the match.
     #[error("{name} is out of memory")]
     Exhausted {
         /// The device.
@@ -510,7 +510,7 @@ pub enum MemoryError {
     },
 }
 
-/// What memory is needed for.
+/// The purpose of memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Purpose {
@@ -520,7 +520,7 @@ pub enum Purpose {
     Image,
 }
 
-/// Shorthand for results of this crate.
+/// The result type of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl Error {
@@ -529,11 +529,11 @@ impl Error {
         Self::Read { path: path.as_ref().to_owned(), cause: cause.into() }
     }
 
-    /// An [`Error::Read`] for the file `path` that the user has named.
+    /// An [`Error::Read`] for the file `path`, whose name the user gave.
     pub(crate) fn opening(path: &Path, error: io::Error) -> Self {
         match error.kind() {
             io::ErrorKind::NotFound => {
-                Self::read(path, Reason::of(error, "there is no such file; check the name"))
+                Self::read(path, Reason::from_io(error, "there is no such file; check the name"))
             }
             _ => Self::read(path, error),
         }
@@ -550,7 +550,7 @@ impl Error {
     }
 }
 
-/// A number of bytes for people.
+/// A number of bytes in readable form.
 fn size(bytes: u64) -> String {
     let [kib, mib] = [10, 20].map(|bits| bytes as f64 / f64::from(1 << bits));
     match mib {
@@ -565,9 +565,8 @@ mod tests {
     use super::*;
     use std::fs;
 
-    /// The system's words, without Rust's.
     #[test]
-    fn errors_of_the_system_are_for_people() {
+    fn system_errors_are_readable() {
         let cut = io::Error::from(io::ErrorKind::UnexpectedEof);
         let own = io::Error::new(io::ErrorKind::NotFound, "the chunk is missing");
         for (error, words) in [
@@ -584,7 +583,7 @@ mod tests {
         }
     }
 
-    /// A library user knows no flags, and no program.
+    /// Messages of the library must not mention flags or the program.
     #[test]
     fn no_text_in_the_source_names_a_flag_or_the_program() {
         let mut files = 0;
@@ -604,7 +603,7 @@ mod tests {
         assert!(files > 20, "{files}");
     }
 
-    /// The errors behind an error, nearest first.
+    /// The sources of an error, nearest first.
     fn sources(error: &Error) -> Vec<&(dyn std::error::Error + 'static)> {
         std::iter::successors(std::error::Error::source(error), |error| error.source()).collect()
     }
@@ -618,7 +617,7 @@ mod tests {
         for (error, kind) in [
             (Error::read("a", denied()), io::ErrorKind::PermissionDenied),
             (Error::write("a", denied()), io::ErrorKind::PermissionDenied),
-            (Error::write("a", Reason::of(denied(), "other words")), io::ErrorKind::PermissionDenied),
+            (Error::write("a", Reason::from_io(denied(), "other words")), io::ErrorKind::PermissionDenied),
             (crate::image::read::grey8(&missing).unwrap_err(), io::ErrorKind::NotFound),
             (crate::text::read(&missing, 1, "file").unwrap_err(), io::ErrorKind::NotFound),
             (crate::image::read::grey8(&below).unwrap_err(), io::ErrorKind::NotADirectory),
@@ -627,7 +626,7 @@ mod tests {
             assert_eq!(found.map(io::Error::kind), Some(kind), "{error}");
             assert_eq!(error, error.clone());
         }
-        // Controls: what no system has said.
+        // Controls: errors that no system error caused.
         assert_eq!(sources(&Error::write("a", "no")).len(), 1);
         assert_eq!(sources(&MemoryError::Exhausted { name: "a".into() }.into()).len(), 0);
     }

@@ -13,7 +13,7 @@ use crate::plan::{GRAPH_WINDOW, Plan};
 use crate::threads::prelude::*;
 use std::ops::Range;
 
-/// The code of a slot that holds no pixel, because the neighbour is outside the image, masked, or missing.
+/// The code of an empty slot: the neighbour is outside the image, masked, or missing.
 pub const NO_MEMBER: u8 = u8::MAX;
 const RADIUS: i32 = GRAPH_WINDOW as i32 / 2;
 /// Rows of pixels whose factors are collected together.
@@ -26,13 +26,13 @@ pub struct LevelGraph {
     height: usize,
     neighbours: usize,
     codes: Vec<u8>,
-    /// Offset of a member from its factor, in raster indices, by code.
+    /// Raster offset of a member from its factor, by code.
     steps: Vec<isize>,
     starts: Vec<u32>,
     incoming: Vec<Incoming>,
 }
 
-/// A slot that holds a pixel: the factor's place relative to the pixel, and the slot.
+/// An entry of the transposed table: a factor, relative to the pixel, and its slot that holds the pixel.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Incoming(u16);
@@ -45,7 +45,7 @@ impl Incoming {
         Self(((dx + RADIUS) | (dy + RADIUS) << 3 | (slot as i32) << 6) as u16)
     }
 
-    /// The same factor's `slot`, where this is slot 0.
+    /// The same factor's `slot`, for an entry of slot 0.
     #[inline(always)]
     fn in_slot(self, slot: u16) -> Self {
         Self(self.0 | slot << 6)
@@ -101,11 +101,11 @@ impl LevelGraph {
             });
             assert!(inside, "factor ({x}, {y}): member code {code} leads out of the image");
         }
-        Self::of_valid(width, height, neighbours, codes)
+        Self::from_valid(width, height, neighbours, codes)
     }
 
-    /// As [`Self::new`], without a check of the codes.
-    fn of_valid(width: usize, height: usize, neighbours: usize, codes: Vec<u8>) -> Self {
+    /// Like [`Self::new`], without checking the codes.
+    fn from_valid(width: usize, height: usize, neighbours: usize, codes: Vec<u8>) -> Self {
         let step = |(dx, dy): (i32, i32)| dy as isize * width as isize + dx as isize;
         let steps = offsets().map(step).collect();
         let mut graph =
@@ -114,7 +114,7 @@ impl LevelGraph {
         graph
     }
 
-    /// The transposed table: where the entries of each pixel start, with one more than there are pixels, and the entries.
+    /// The transposed table: where the entries of each pixel start (one more than there are pixels), and the entries.
     fn transposed(&self) -> (Vec<u32>, Vec<Incoming>) {
         let (pixels, band) = (self.width * self.height, BAND * self.width);
         let of_band = |i: usize| i * band..((i + 1) * band).min(pixels);
@@ -147,7 +147,7 @@ impl LevelGraph {
     /// Calls `with` for every slot that holds one of `pixels`, with the index of the pixel among them.
     #[inline(always)]
     fn each_member(&self, pixels: &Range<usize>, mut with: impl FnMut(usize, Incoming)) {
-        // By code: from a factor to its member, and the entry of slot 0. An empty slot leads to no pixel.
+        // By code: the step to the member, which leaves the image for an empty slot, and the entry of slot 0.
         let mut steps = [isize::MIN / 2; 1 << u8::BITS];
         let mut entries = [Incoming::default(); 1 << u8::BITS];
         for ((step, entry), (&to, (dx, dy))) in
@@ -205,7 +205,7 @@ impl LevelGraph {
         &self.codes[(y * self.width + x) * self.neighbours..][..self.neighbours]
     }
 
-    /// Codes of all factors' neighbours, `slots() - 1` per pixel.
+    /// Codes of the neighbours of all factors, `slots() - 1` per pixel.
     #[must_use]
     pub fn codes(&self) -> &[u8] {
         &self.codes
@@ -226,16 +226,16 @@ pub(crate) fn spatial_weight(method: &Method) -> u32 {
     (ratio * ratio + 0.5).floor().min(f64::from(1u32 << 20)) as u32
 }
 
-/// Number of pixels of a row whose neighbours are chosen together.
+/// Pixels of a row whose neighbours are chosen together.
 const LANES: usize = 32;
-/// Number of pixels around one that may be its neighbours.
+/// Candidates for the neighbours of a pixel.
 const AROUND: usize = GRAPH_WINDOW * GRAPH_WINDOW - 1;
 
-/// The keys of all that may be neighbours of [`LANES`] adjacent pixels, in whole lines of a cache.
+/// The keys of all candidates of [`LANES`] adjacent pixels, aligned to cache lines.
 #[repr(align(64))]
 struct Keys([[i32; LANES]; AROUND]);
 
-/// The offsets of the window without the centre's, by distance and then in raster order: this rank breaks ties.
+/// The offsets of the window without its centre, by distance, then in raster order, which breaks ties.
 pub(crate) fn by_distance() -> Vec<(i32, i32)> {
     let mut window: Vec<(i32, i32)> = offsets().filter(|&o| o != (0, 0)).collect();
     window.sort_by_key(|&(dx, dy)| dx * dx + dy * dy);
@@ -273,11 +273,11 @@ pub fn of_level(image: &Image, plan: &Plan) -> LevelGraph {
             },
         );
     }
-    LevelGraph::of_valid(width, height, neighbours, codes)
+    LevelGraph::from_valid(width, height, neighbours, codes)
 }
 
-/// A plane of `convert`ed values with `beyond` at both ends of its rows: [`RADIUS`] times at the start, and as often and [`LANES`]
-/// times at the end.
+/// Converts a plane, and pads its rows with `beyond`: [`RADIUS`] values at the start, and [`RADIUS`] +
+/// [`LANES`] at the end.
 fn padded<T: Sync, U: Copy + Send + Sync>(
     plane: &Plane<T>,
     beyond: U,
@@ -295,7 +295,7 @@ fn padded<T: Sync, U: Copy + Send + Sync>(
     Plane::new(pitch, height, data)
 }
 
-/// The data that neighbours are chosen by, as planes per channel, so that many pixels are processed with vectors.
+/// The data that the neighbours are chosen by, in one plane per channel for vector instructions.
 struct Guide {
     network: Network,
     /// The offsets of the window, nearest first.
@@ -307,18 +307,18 @@ struct Guide {
     masked: Plane<i32>,
 }
 
-/// What it takes to find the smallest of [`AROUND`] keys, in order: half as many comparisons as one insertion after the other. Both
-/// halves are searched in the same way, and what they found is merged by Batcher's odd-even merge. Only comparisons that matter for the
-/// smallest are left.
+/// A network that finds the smallest of [`AROUND`] keys in order, with half the comparisons of insertions one
+/// by one. It searches both halves in the same way, and joins the results by Batcher's odd-even merge.
+/// Comparisons that do not affect the smallest keys are dropped.
 struct Network {
     /// Places to compare and exchange so that the first holds the smaller key, one pair after the other.
     pairs: Vec<(u8, u8)>,
-    /// Where the smallest keys are then, in order.
+    /// The places that hold the smallest keys afterwards, in order.
     smallest: Vec<u8>,
 }
 
 impl Network {
-    /// For the `count` smallest keys.
+    /// A network for the `count` smallest keys.
     fn new(count: usize) -> Self {
         let mut all = Vec::new();
         let places: Vec<u8> = (0..AROUND as u8).collect();
@@ -338,7 +338,7 @@ impl Network {
         Self { pairs, smallest }
     }
 
-    /// The places of the `count` smallest keys in `places`, once the comparisons that join `pairs` are made.
+    /// The places of the `count` smallest keys among `places`, after the comparisons that it adds to `pairs`.
     fn select(places: &[u8], count: usize, pairs: &mut Vec<(u8, u8)>) -> Vec<u8> {
         if places.len() == 1 {
             return places[..count.min(1)].to_vec();
@@ -377,13 +377,13 @@ impl Network {
     }
 }
 
-/// The neighbours of all pixels of row `y`.
+/// Chooses the neighbours of all pixels of row `y`.
 #[pulp::with_simd(choose_row = crate::vectors::widest())]
 #[inline(always)]
 fn choose_row_on<'a, S: pulp::Simd>(_: S, guide: &'a Guide, y: usize, keys: &'a mut Keys, row: &'a mut [u8]) {
     let Guide { network, window, .. } = guide;
     let neighbours = network.smallest.len();
-    // By rank.
+    // Codes by rank.
     let mut codes = [NO_MEMBER; 1 << RANK_BITS];
     for (code_of, &(dx, dy)) in codes.iter_mut().zip(window) {
         *code_of = code(dx, dy);
@@ -405,7 +405,7 @@ fn choose_row_on<'a, S: pulp::Simd>(_: S, guide: &'a Guide, y: usize, keys: &'a 
     }
 }
 
-/// The keys of all that may be neighbours of the pixels of row `y` from column `x` on: the distance, and the rank.
+/// Computes the keys of all candidates for the pixels of row `y` from column `x` on: distance and rank.
 #[inline(always)]
 fn offer(guide: &Guide, x: usize, y: usize, keys: &mut Keys) {
     let Guide { window, weight, channels, masked, .. } = guide;

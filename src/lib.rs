@@ -59,7 +59,7 @@
 //! # }
 //! ```
 //!
-//! A browser lets nobody wait. There, `build_async`, `run_async` and the like take the place of the functions that wait:
+//! A browser must not block. There, use `build_async`, `run_async` and the other async functions instead:
 //!
 //! ```
 //! # use mrfgs::{Matcher, Method, Pair};
@@ -73,18 +73,18 @@
 //! ```
 //!
 //! - [`Method`] holds every option that determines the bits of the maps; [`options`] describes them all.
-//! - [`Matched`] is what a match gives: maps of disparity, confidence and validity, and what made them.
-//! - [`colour`] shows maps as pictures.
-//! - [`check`] warns of what is probably wrong with a pair, and finds its range.
-//! - [`calibration`] reads what is known of the cameras, and [`rectification`] makes rectified pairs of their images.
+//! - [`Matched`] is the result of a match: maps of disparity, confidence and validity, and their origin.
+//! - [`colour`] renders maps as pictures.
+//! - [`check`] warns of likely faults of a pair, and finds its disparity range.
+//! - [`calibration`] reads the calibrations of cameras, and [`rectification`] rectifies their images.
 //! - [`drift`] finds how the cameras of a rig have turned since they were calibrated, from their frames.
-//! - [`region`] matches a part of the left view alone.
-//! - [`steady`] lets the maps of a video hold still where the scene does.
-//! - [`depth`] turns disparities into depths and points, where the cameras are known.
+//! - [`region`] matches a region of the left view alone.
+//! - [`steady`] smooths the maps of a video over time where the scene is static.
+//! - [`depth`] turns disparities into depths and points, for calibrated cameras.
 //! - [`evaluation`] compares maps with ground truth.
 //! - [`image`] reads and writes images and maps.
-//! - [`threads`] says how many threads work where nobody says it, and bounds those that work beside matchers.
-//! - [`low_level`] has the parts of the engine, for those who build on it or study it.
+//! - [`threads`] has the default number of threads, and limits the threads outside matchers.
+//! - [`low_level`] has the parts of the engine, for extending or studying it.
 //!
 //! Beliefs, messages and evidence are costs in integers (see [`low_level::plan`]), so the CPU path and every GPU give the same
 //! maps bit for bit, whatever the number of threads.
@@ -132,11 +132,11 @@ pub use front::drift;
 pub use image::Pair;
 #[cfg(not(target_arch = "wasm32"))]
 pub use matcher::SharedMatcher;
-pub use matcher::{Answer, Builder, Found, Job, Matched, Matcher, Search, Timing};
+pub use matcher::{Answer, AutoRange, Builder, Job, Matched, Matcher, Search, Timing};
 pub use options::Method;
 pub use watch::Progress;
 
-/// The parts of the engine, for those who build on it or study it. They change more often than the rest.
+/// The parts of the engine, for extending or studying it. They change more often than the rest.
 pub mod low_level {
     macro_rules! parts {
         ($( #[doc = $about:literal] $name:ident; )*) => {
@@ -145,25 +145,25 @@ pub mod low_level {
     }
 
     parts! {
-        /// What runs the stages: the CPU path and devices.
+        /// The backends, which run the stages: the CPU path and GPUs.
         backend;
-        /// What runs a list on a backend.
+        /// Runs a list of steps on a backend.
         engine;
-        /// What a match needs of a pair: illumination, texture zones, sparse matches, label ranges.
+        /// Data that a match derives from a pair: illumination, texture zones, sparse matches, label ranges.
         front;
         /// The members of the dependency factors.
         graph;
-        /// What a match will do, before it does anything: levels, integer parameters, bounds, memory.
+        /// The plan of a match, known before it runs: levels, integer parameters, bounds, memory.
         plan;
-        /// What the messages cost at least, to hold a machine against.
+        /// A lower bound on the cost of message passing, to compare a machine with.
         roofline;
-        /// What belongs to one process, and what one that is forked takes along.
+        /// Data that belongs to one process, and how it behaves when the process forks.
         process;
-        /// A match as a list of steps: the schedule, and how a pair is cut that is too large for its memory.
+        /// A match as a list of steps: the schedule, and tiles for pairs that exceed the memory.
         program;
         /// The stages, exactly defined.
         stage;
-        /// Small text files, and what messages quote of them.
+        /// Reads small text files, and quotes them in messages.
         text;
         /// Progress and time of a match.
         watch;

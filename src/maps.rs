@@ -1,4 +1,4 @@
-//! The maps that a match leaves behind, and what a pixel of them means.
+//! The maps that a match computes, and the meaning of their pixels.
 
 use crate::image::{Plane, Rect};
 use crate::options::MAX_DISPARITY;
@@ -6,7 +6,7 @@ use crate::options::MAX_DISPARITY;
 /// Fixed-point units of disparity in one pixel.
 pub const FRACTION: i32 = 256;
 
-/// Why a pixel is what it is: bits of the validity map. A pixel of 0 is measured and trusted.
+/// The bits of the validity map: the reasons for the state of a pixel. A pixel of 0 is measured and trusted.
 pub mod flag {
     /// The match is outside the right image.
     pub const OUTSIDE: u8 = 1;
@@ -28,7 +28,7 @@ pub mod flag {
     pub const INVALID: u8 = OUTSIDE | OCCLUDED | SPECKLE | MASKED | TIE | OUTVOTED;
 }
 
-/// The bits of the validity map, each with its name and what it says; 0 stands for a pixel without any.
+/// The bits of the validity map, each with its name and meaning; 0 stands for a pixel without any.
 pub const REASONS: [(u8, &str, &str); 9] = [
     (0, "measured", "found in both views and trusted"),
     (flag::OUTSIDE, "outside", "the match is outside the right image"),
@@ -45,7 +45,7 @@ pub const REASONS: [(u8, &str, &str); 9] = [
     (flag::MASKED, "masked", "the image holds no data here"),
 ];
 
-/// What a match leaves behind; all maps have the size of the images.
+/// The maps of a match, all of the size of the images.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Maps {
     /// The final disparity in 1/256 px; meaningless where [`has_disparity`] says no.
@@ -66,7 +66,7 @@ pub struct Maps {
 pub struct RightMap {
     /// The disparity in 1/256 px; meaningless where [`has_disparity`] says no.
     pub disparity: Plane<i32>,
-    /// Bits of [`flag`], the views in each other's place; no bit for low confidence.
+    /// Bits of [`flag`] with the views exchanged; never low confidence.
     pub validity: Plane<u8>,
 }
 
@@ -77,8 +77,8 @@ pub fn has_disparity(validity: u8) -> bool {
 }
 
 impl Maps {
-    /// The maps of a disparity map in pixels that a match has written, or another matcher: disparities count in 1/256 px. Pixels without
-    /// a finite one within [`MAX_DISPARITY`] are masked, and nothing more is known of those before post-processing.
+    /// Maps from a disparity map in pixels, of a match or of another matcher, rounded to 1/256 px. Pixels
+    /// without a finite disparity within [`MAX_DISPARITY`] are masked. The raw map equals the final one.
     ///
     /// # Panics
     /// When the maps differ in size.
@@ -89,12 +89,12 @@ impl Maps {
         for (validity, d) in validity.data_mut().iter_mut().zip(disparity.data()) {
             *validity = if known(*d) { *validity } else { flag::MASKED };
         }
-        // Floats hold every disparity of a match exactly.
+        // Floats represent every disparity of a match exactly.
         let disparity = disparity.map(|d| if known(*d) { (d * FRACTION as f32).round() as i32 } else { 0 });
         Self { raw: disparity.clone(), disparity, confidence, validity, right: None }
     }
 
-    /// The part of (width, height) from the top left.
+    /// The top left part of (width, height) pixels.
     pub(crate) fn cut_to(self, size: (usize, usize)) -> Self {
         Self {
             disparity: self.disparity.cut_to(size),
@@ -108,7 +108,7 @@ impl Maps {
         }
     }
 
-    /// Those of `part`.
+    /// The maps of `part`.
     #[must_use]
     pub fn crop(&self, part: &Rect) -> Self {
         Self {
@@ -129,7 +129,7 @@ impl Maps {
         pixels(&self.disparity, &self.validity, has_disparity)
     }
 
-    /// The final map of the right view in pixels, `+inf` where there is none; `None` unless it was asked for.
+    /// The final map of the right view in pixels, `+inf` where there is none; `None` if it was not asked for.
     #[must_use]
     pub fn right_map(&self) -> Option<Plane<f32>> {
         self.right.as_ref().map(|right| pixels(&right.disparity, &right.validity, has_disparity))
@@ -155,7 +155,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn maps_come_back_from_their_pixels() {
+    fn maps_survive_a_round_trip_through_pixels() {
         let disparity = Plane::new(4, 1, vec![1000, -7, 3, 5]);
         let validity =
             Plane::new(4, 1, vec![0, flag::LOW_CONFIDENCE, flag::MASKED, flag::TIE | flag::FILLED]);
@@ -166,7 +166,7 @@ mod tests {
         assert_eq!(back(&map).final_map(), map);
         assert_eq!(back(&map).validity, maps.validity);
 
-        // What a user has taken away is not there, even if it was filled in; nor is what no match finds.
+        // Disparities that a user removed count as missing, even filled ones, and so do unmatched ones.
         let taken = [f32::INFINITY, f32::NAN, 0.5, 2e6];
         let without = back(&Plane::new(4, 1, taken.to_vec()));
         assert_eq!(without.validity.data(), [flag::MASKED, flag::MASKED, flag::MASKED, flag::MASKED]);

@@ -1,61 +1,61 @@
-//! How much memory there is to ask for, and memory that can be refused.
+//! The memory of the machine, and allocations that can fail.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{MemoryError, Purpose, Result};
 use crate::process::PerProcess;
 
-/// Bytes that can be had without swapping, where the system says so.
+/// Bytes that are available without swapping, if the system tells.
 #[cfg(not(target_arch = "wasm32"))]
 fn available() -> Option<u64> {
     let mut system = sysinfo::System::new();
     system.refresh_memory_specifics(sysinfo::MemoryRefreshKind::nothing().with_ram());
-    // In a root without /proc there is nothing to read.
+    // Without /proc there is nothing to read.
     let known = sysinfo::IS_SUPPORTED_SYSTEM && system.total_memory() > 0;
     known.then(|| system.available_memory())
 }
 
-/// A browser does not say.
+/// Unknown in browsers.
 #[cfg(target_arch = "wasm32")]
 fn available() -> Option<u64> {
     None
 }
 
-/// Addresses that may be gone at the next allocation of a thread: glibc gives a thread a heap of its own, of this size, as soon
-/// as it finds room for it.
+/// Address space that the next allocation of a thread may take: glibc reserves a heap of this size for each
+/// thread.
 const HEAP: usize = if cfg!(all(target_os = "linux", target_env = "gnu")) { 64 << 20 } else { 0 };
 
-/// Declines to take `bytes` that this machine cannot give, or does not let this process have: the system would end the process
-/// without a word.
+/// Refuses `bytes` that this machine does not have, or denies to this process; otherwise the system may kill
+/// the process without a message.
 ///
 /// # Errors
-/// [`MemoryError::Machine`] with both figures, where both are known.
+/// [`MemoryError::Machine`] with both figures, if both are known.
 pub(crate) fn check(bytes: u64, purpose: Purpose) -> Result<(), MemoryError> {
     if let Some(free) = available().filter(|free| bytes > *free) {
         return Err(MemoryError::Machine { needed: bytes, available: Some(free), purpose });
     }
-    // Limits of the process (`ulimit -v`) and of a system that does not overcommit: what is never touched costs nothing.
+    // Catches limits of the process (`ulimit -v`) and systems that do not overcommit. Untouched memory costs nothing.
     let with_heap = usize::try_from(bytes).unwrap_or(usize::MAX).saturating_add(HEAP);
     Vec::<u8>::new().try_reserve_exact(with_heap).map_err(|_| lacking(bytes, purpose))
 }
 
-/// Bytes that have been claimed.
+/// Bytes that are claimed at present.
 static CLAIMED: PerProcess<AtomicU64> = PerProcess::new();
 
-/// Memory that somebody takes, step by step, while this lives: other claims must do without it.
+/// Memory that an operation takes step by step during the life of the claim. Other claims do not count on it.
 pub(crate) struct Claim(u64);
 
 impl Claim {
-    /// Claims `bytes` for what is done to an image.
+    /// Claims `bytes` for work on an image.
     ///
     /// # Errors
-    /// Those of [`check`], of this claim and of all claims together.
+    /// The errors of [`check`], for this claim and for the sum of all claims.
     pub(crate) fn new(bytes: u64) -> Result<Self, MemoryError> {
-        // Alone first: what is too much in any case is told in the same way whatever others claim at this moment.
+        // Check the claim by itself first, so that the error of one that is too large never depends on others.
         check(bytes, Purpose::Image)?;
         let claim = Self(bytes);
         let others = CLAIMED.get().fetch_add(bytes, Ordering::Relaxed);
-        // Where it fails the claim is dropped.
+        // On failure, dropping the claim subtracts it.
         check(others.saturating_add(bytes), Purpose::Image).map(|()| claim)
     }
 }
@@ -73,7 +73,7 @@ fn lacking(bytes: u64, purpose: Purpose) -> MemoryError {
 /// An empty vector with room for `count` values.
 ///
 /// # Errors
-/// [`MemoryError::Machine`] when the system has not as much.
+/// [`MemoryError::Machine`] when the system has too little.
 pub(crate) fn reserved<T>(count: usize) -> Result<Vec<T>, MemoryError> {
     let mut out = Vec::new();
     let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);
@@ -84,7 +84,7 @@ pub(crate) fn reserved<T>(count: usize) -> Result<Vec<T>, MemoryError> {
 /// A vector of `count` times `value`.
 ///
 /// # Errors
-/// [`MemoryError::Machine`] when the system has not as much.
+/// [`MemoryError::Machine`] when the system has too little.
 pub(crate) fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, MemoryError> {
     let mut out = reserved(count)?;
     out.resize(count, value);
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_no_machine_has_is_declined() {
+    fn impossible_amounts_are_refused() {
         for bytes in [1 << 55, u64::MAX] {
             let said = check(bytes, Purpose::Image).unwrap_err().to_string();
             assert!(said.contains("GiB of memory are needed") && !said.contains('\n'), "{said}");

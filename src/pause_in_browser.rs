@@ -6,7 +6,7 @@ use wasm_bindgen::JsCast;
 use wasm_bindgen_futures::JsFuture;
 use web_time::Instant;
 
-/// How long the thread may be busy before its messages are looked at. A pause takes some milliseconds.
+/// How long the thread may be busy without receiving messages. A pause takes some milliseconds.
 const BUSY: Duration = Duration::from_millis(100);
 
 /// When to pause.
@@ -16,7 +16,7 @@ pub(crate) struct Pause {
 }
 
 impl Pause {
-    /// To be awaited often: lets the thread receive messages, and a window draw, if it has been busy for a while.
+    /// Must be awaited often. If the thread has been busy for a while, lets it receive messages and draw.
     pub(crate) async fn now_and_then(&mut self) {
         if self.last.get_or_insert_with(Instant::now).elapsed() < BUSY {
             return;
@@ -26,7 +26,7 @@ impl Pause {
             Reflect::get(&global, &"setTimeout".into()).ok().and_then(|f| f.dyn_into::<Function>().ok());
         if let Some(timer) = timer {
             let turn = Promise::new(&mut |resolve, _| {
-                // Without a turn the match goes on.
+                // If the timer fails, the match goes on.
                 let _ = timer.call1(&global, &resolve);
             });
             let _ = JsFuture::from(turn).await;

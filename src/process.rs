@@ -1,7 +1,7 @@
-//! What belongs to one process.
+//! Data that belongs to one process.
 //!
-//! A fork leaves a child the memory of its parent, but none of its other threads: pools have nobody who works, threads cannot be joined,
-//! and locks that were held stay locked. So a child makes its own of such things, and neither uses nor drops what it finds.
+//! A forked child has the memory of its parent, but none of its other threads: pools have no workers, threads cannot be joined,
+//! and locks that were held stay locked. So a child makes its own data of this kind, and neither uses nor drops its parent's.
 
 use crate::error::{ExecutionError, Result};
 use std::mem;
@@ -10,12 +10,12 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
 use std::thread;
 use std::time::Duration;
 
-/// The number of this process; a browser has one alone.
+/// The number of this process; 1 in a browser.
 pub(crate) fn id() -> u32 {
     if cfg!(target_arch = "wasm32") { 1 } else { std::process::id() }
 }
 
-/// Something that no other process uses or drops than the one that made it.
+/// A value that only the process that made it uses and drops.
 #[derive(Debug)]
 pub struct Own<T> {
     process: u32,
@@ -23,17 +23,17 @@ pub struct Own<T> {
 }
 
 impl<T> Own<T> {
-    /// Something of this process.
+    /// A value of this process.
     pub fn new(thing: T) -> Self {
         Self { process: id(), thing: Some(thing) }
     }
 
-    /// What it is; `None` in another process.
+    /// The value; `None` in another process.
     pub fn get(&self) -> Option<&T> {
         self.thing.as_ref().filter(|_| self.process == id())
     }
 
-    /// The same, to be changed.
+    /// The value, mutable; `None` in another process.
     pub fn get_mut(&mut self) -> Option<&mut T> {
         self.thing.as_mut().filter(|_| self.process == id())
     }
@@ -48,13 +48,13 @@ impl<T> Drop for Own<T> {
     }
 }
 
-/// Something of which each process makes its own, the first time that it needs it.
+/// A value that each process makes for itself when it first needs it.
 #[derive(Debug)]
 pub struct PerProcess<T> {
     first: OnceLock<Box<Link<T>>>,
 }
 
-/// That of one process; next comes that of a process that was forked from it.
+/// The value of one process. The next link is that of a child forked from it.
 #[derive(Debug)]
 struct Link<T> {
     own: Own<T>,
@@ -62,13 +62,13 @@ struct Link<T> {
 }
 
 impl<T> PerProcess<T> {
-    /// Nothing yet.
+    /// No process has a value yet.
     #[must_use]
     pub const fn new() -> Self {
         Self { first: OnceLock::new() }
     }
 
-    /// That of this process. To make it must take no time: whoever is forked meanwhile waits for ever.
+    /// The value of this process. `T::default` must be quick: a child that is forked during it waits forever.
     pub fn get(&self) -> &T
     where
         T: Default,
@@ -78,7 +78,7 @@ impl<T> PerProcess<T> {
             let link =
                 place.get_or_init(|| Box::new(Link { own: Own::new(T::default()), next: OnceLock::new() }));
             match link.own.get() {
-                // The last one counts: a process that is gone may have had the same number.
+                // The last link counts, because a process that has ended may have had the same number.
                 Some(own) if link.next.get().is_none() => return own,
                 _ => place = &link.next,
             }
@@ -92,7 +92,7 @@ impl<T> Default for PerProcess<T> {
     }
 }
 
-/// Something that threads use in turns, and that a child takes along, unless another thread was using it when the child was forked.
+/// A value that threads use in turns. A forked child keeps it, unless another thread was using it during the fork.
 #[derive(Debug, Default)]
 pub struct Turns<T> {
     /// The last process in which a turn began.
@@ -101,7 +101,7 @@ pub struct Turns<T> {
 }
 
 impl<T> Turns<T> {
-    /// Something that nobody uses yet.
+    /// A value that no thread uses yet.
     pub fn new(thing: T) -> Self {
         Self { process: AtomicU32::new(0), thing: Mutex::new(thing) }
     }
@@ -109,9 +109,9 @@ impl<T> Turns<T> {
     /// Waits for a turn.
     ///
     /// # Errors
-    /// [`ExecutionError::Forked`] where the turn never ends that another thread had when this process was forked.
+    /// [`ExecutionError::Forked`] when another thread held the value during the fork, so that its turn never ends.
     pub fn turn(&self) -> Result<MutexGuard<'_, T>> {
-        // Another thread of this process may have the first turn of it, and be about to say so.
+        // Another thread of this process may hold the first turn, and be about to store the process.
         const TRIES: u32 = 100;
         for _ in 0..TRIES {
             if self.process.load(Ordering::Acquire) == id() {
@@ -139,7 +139,7 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::AtomicUsize;
 
-    /// As a child finds what its parent has left.
+    /// A value as a child finds it after a fork.
     fn of_parent<T>(thing: T) -> Own<T> {
         Own { process: id() + 1, thing: Some(thing) }
     }
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_of_another_process_is_neither_used_nor_dropped() {
+    fn values_of_another_process_are_neither_used_nor_dropped() {
         let counted = Arc::new(());
         let mut own = Own::new(Arc::clone(&counted));
         assert!(own.get().is_some() && own.get_mut().is_some());
@@ -169,7 +169,7 @@ mod tests {
         let numbers = PerProcess::<AtomicUsize>::new();
         numbers.get().store(1, Ordering::Relaxed);
         assert_eq!(numbers.get().load(Ordering::Relaxed), 1);
-        // A child finds that of its parent in front.
+        // A child finds its parent's value first.
         let link = Link { own: of_parent(AtomicUsize::new(7)), next: OnceLock::new() };
         let numbers = PerProcess { first: OnceLock::from(Box::new(link)) };
         assert_eq!(numbers.get().load(Ordering::Relaxed), 0);
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_that_never_ends_is_told() {
+    fn a_turn_that_never_ends_is_an_error() {
         let turns = Turns::new(5);
         assert_eq!(*turns.turn().unwrap(), 5);
         assert_eq!(*turns.turn().unwrap(), 5);

@@ -1,4 +1,4 @@
-//! A part of the left view that alone is wanted: the window of both views that is matched for it, and its part of the maps.
+//! A region of the left view that is matched alone: the window of both views that it needs, and its part of the maps.
 
 use crate::error::{Error, Result};
 use crate::image::{Pair, Rect};
@@ -7,11 +7,11 @@ use crate::options::DisparityRange;
 use crate::program::tiles::OVERLAP;
 use std::ops::Range;
 
-/// Columns and rows on which windows begin: those of the pyramid's coarsest level, so that its pixels are those of the whole pair.
+/// Windows start at multiples of this many pixels, the pixel size of the coarsest level, to share its grid.
 const GRID: usize = 32;
 
-/// A region of the left view, which is matched as a tile of the whole would be. Its maps are not bit for bit a part of the maps of the whole pair, in which all pixels take part, but
-/// the same on every device, as all maps are.
+/// A region of the left view, which is matched like a tile. Its maps may differ from those of the whole pair,
+/// to which all pixels contribute, but are the same on every device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Region {
     part: Rect,
@@ -30,7 +30,7 @@ impl Region {
                 part.x.start, part.x.end, part.y.start, part.y.end
             )));
         }
-        // The right view has it from x - max to x - min.
+        // The right view shows x at x - max to x - min.
         let reach = |disparity: i32| usize::try_from(disparity).unwrap_or(0);
         let window = |ends: &Range<usize>, before: usize, after: usize, length: usize| {
             let start = ends.start.saturating_sub(before + OVERLAP);
@@ -47,19 +47,19 @@ impl Region {
         &self.part
     }
 
-    /// What is matched for it, in pixels of both views.
+    /// The window that is matched for the region, in pixels of both views.
     #[must_use]
     pub fn window(&self) -> &Rect {
         &self.window
     }
 
-    /// What is matched of a pair: the region with what the right view has of it, and a margin.
+    /// The part of a pair that is matched: the region, its counterpart in the right view, and a margin.
     #[must_use]
     pub fn window_of(&self, pair: &Pair) -> Pair {
         pair.crop(&self.window)
     }
 
-    /// The maps of the region, from those of its window.
+    /// The maps of the region, from the maps of its window.
     #[must_use]
     pub fn maps_of(&self, maps: &Maps) -> Maps {
         maps.crop(&self.part.within(&self.window))
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_window_holds_what_the_right_view_has() {
+    fn the_window_includes_the_counterpart_in_the_right_view() {
         let region = |x, y, (min, max)| {
             Region::new(Rect { x, y }, (300, 200), DisparityRange { min, max }).map(|region| region.window)
         };

@@ -1,29 +1,29 @@
-//! Depths as another camera sees them: what depth cameras call registration.
+//! Depths as another camera sees them (registration).
 
 use crate::calibration::cameras::ThirdCamera;
 use crate::image::Plane;
 
-/// Neighbours whose disparities differ by no more than this, in pixels, are one surface.
+/// Neighbours whose disparities differ by at most this much, in pixels, belong to one surface.
 const STEP: f32 = 1.0;
 
-/// A pixel that the other camera would see more than so many pixels wide or high gives no depth: what it shows between its corners is
-/// not known that finely.
+/// A pixel that covers more than this many pixels of the other camera in width or height gives no depth,
+/// since the map does not resolve so much.
 const WIDEST: f64 = 64.0;
 
 /// A corner of a pixel, as the other camera sees it.
 #[derive(Clone, Copy)]
 struct Vertex {
-    /// Where it appears.
+    /// Its position in the image.
     at: [f64; 2],
-    /// 1 / Z there, which is linear in the image between the corners of a plane.
+    /// 1 / Z, which is linear in the image over a plane.
     nearness: f64,
 }
 
-/// The depths of a map of `disparities` along the axis of the `camera`, at its pixels: +infinity where it sees what the map does not.
-/// `point` is where the pixel (x, y) is at a disparity, in the frame of the camera.
+/// The depths of a map of `disparities` along the axis of `camera`, at its pixels; +infinity where the map shows nothing.
+/// `point` gives the position of the pixel (x, y) at a disparity, in the frame of the camera.
 ///
-/// Each pixel is a piece of a surface, with the footprint of the pixel. Pieces of one surface share their corners, so no gap opens between
-/// them where the other camera sees them larger; between surfaces it stays open. The nearest piece hides the others.
+/// Each pixel is a piece of surface with the footprint of the pixel. Pieces of one surface share their corners, so no gaps open
+/// between them where the other camera magnifies them; gaps between surfaces stay open. The nearest piece hides the others.
 pub(crate) fn render(
     disparities: &Plane<f32>,
     camera: &ThirdCamera,
@@ -53,7 +53,7 @@ pub(crate) fn render(
     depths
 }
 
-/// The disparity at a corner of a pixel: the mean of the pixels around it that are one surface with this one.
+/// The disparity at a corner of a pixel: the mean of the pixels around it that belong to the same surface.
 fn at_corner(disparities: &Plane<f32>, [x, y]: [usize; 2], [right, below]: [bool; 2]) -> f64 {
     let beside = |count: usize, after: bool| if after { Some(count + 1) } else { count.checked_sub(1) };
     let value = |x: Option<usize>, y: Option<usize>| {
@@ -62,7 +62,7 @@ fn at_corner(disparities: &Plane<f32>, [x, y]: [usize; 2], [right, below]: [bool
         inside.then(|| disparities[(x, y)]).filter(|d| d.is_finite())
     };
     let (across, down) = (beside(x, right), beside(y, below));
-    // Around the corner, each beside the next one.
+    // The four pixels around the corner, in circular order.
     let around = [value(Some(x), Some(y)), value(across, Some(y)), value(across, down), value(Some(x), down)];
     let joins =
         |i: usize, j: usize| matches!((around[i], around[j]), (Some(a), Some(b)) if (a - b).abs() <= STEP);
@@ -71,12 +71,12 @@ fn at_corner(disparities: &Plane<f32>, [x, y]: [usize; 2], [right, below]: [bool
     joined[1] |= joined[2] && joins(2, 1);
     joined[3] |= joined[2] && joins(2, 3);
     let surface = around.iter().zip(joined).filter(|(_, joined)| *joined).filter_map(|(d, _)| *d);
-    // Sums of four of them are exact, so all pixels of the surface find the same one.
+    // Sums of four are exact, so all pixels of the surface get the same mean.
     let (sum, count) = surface.fold((0.0, 0.0), |(sum, count), d| (sum + f64::from(d), count + 1.0));
     sum / count
 }
 
-/// Puts a triangle where nothing nearer is. Its edges belong to it.
+/// Draws a triangle, edges included, where nothing nearer is drawn.
 fn fill(depths: &mut Plane<f32>, corners: [Vertex; 3]) {
     let [a, b, c] = corners.map(|corner| corner.at);
     let cross = |[ax, ay]: [f64; 2], [bx, by]: [f64; 2], [x, y]: [f64; 2]| {

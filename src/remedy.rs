@@ -1,7 +1,7 @@
-//! What helps about an error or a warning, in the words of a front end.
+//! Remedies for errors and warnings, in the terms of a front end.
 //!
-//! The library names causes; what to do about them is often a flag, an argument or a field that only the front end knows. There is
-//! one row for each cause here, and [`Words`] has what a front end calls the few things that help.
+//! The library names causes. The remedy is often a flag, an argument or a field that only the front end knows. There
+//! is one row for each cause here, and a [`Vocabulary`] has the front end's names for the few things that help.
 
 use crate::error::{
     BudgetError, DeviceError, Error, ExecutionError, MemoryError, OptionError, Purpose, RangeError,
@@ -11,12 +11,12 @@ use crate::front::check::Warning;
 use crate::maps::FRACTION;
 use crate::rectification::Doubt;
 
-/// What a front end calls what helps. `None` is what it does not have.
+/// A front end's names for its options; `None` for options that it does not have.
 #[derive(Clone, Copy, Debug)]
-pub struct Words {
-    /// What stands before and after the name of a key of the method.
+pub struct Vocabulary {
+    /// The text before and after the name of a key of the method.
     pub key: [&'static str; 2],
-    /// What lists the keys.
+    /// How to list the keys.
     pub keys: Option<&'static str>,
     /// The preset.
     pub preset: &'static str,
@@ -24,27 +24,27 @@ pub struct Words {
     pub min: &'static str,
     /// The largest disparity.
     pub max: &'static str,
-    /// Both together, where they are one thing.
+    /// The range of disparities, if the front end takes both ends as one option.
     pub range: Option<&'static str>,
     /// The device.
     pub device: &'static str,
-    /// What lists the devices.
+    /// How to list the devices.
     pub devices: Option<&'static str>,
-    /// What to do where no device serves.
+    /// What to do if no device works.
     pub cpu: &'static str,
-    /// What to do where there is no driver, and where it computes nonsense.
+    /// What to do if there is no driver, and if it gives wrong results.
     pub driver: [&'static str; 2],
-    /// How a process is begun that may open devices, though its parent has.
+    /// How to start a process that may open devices although its parent has.
     pub fork: &'static str,
     /// The number of threads.
     pub threads: &'static str,
     /// The memory that is granted to a match, and the unit that follows its number.
     pub memory: Option<[&'static str; 2]>,
-    /// What asks for the steps of a match.
+    /// The option that shows the steps of a match.
     pub steps: Option<&'static str>,
-    /// What to do about pixels that are no image.
+    /// What to do about pixels that show no scene.
     pub mask: Option<&'static str>,
-    /// The maximum of pixels.
+    /// The largest number of pixels.
     pub max_pixels: Option<&'static str>,
     /// The scale of whole numbers in a disparity map or a ground truth.
     pub truth_scale: Option<&'static str>,
@@ -52,18 +52,18 @@ pub struct Words {
     pub no_data: Option<&'static str>,
     /// The calibration that rectifies a pair.
     pub calibration: &'static str,
-    /// What turns images upright.
+    /// The option that turns images upright.
     pub orient: Option<&'static str>,
-    /// What rectifies a pair.
+    /// The option that rectifies a pair.
     pub rectify: Option<&'static str>,
-    /// What to do about a unit that is wrong.
+    /// What to do about a wrong unit.
     pub unit: Option<&'static str>,
-    /// What says which part of the calibrated images the images are.
+    /// The option that says which part of the calibrated images the images are.
     pub crop: Option<&'static str>,
 }
 
-impl Words {
-    /// Of a front end that calls everything as the library does, and lacks the rest. [`Words::cpu`] is for each to say.
+impl Vocabulary {
+    /// The names of the library, without optional remedies. Each front end sets its own `cpu`.
     pub const PLAIN: Self = Self {
         key: ["", ""],
         keys: None,
@@ -93,7 +93,7 @@ impl Words {
 
 /// An error with its remedy.
 #[must_use]
-pub fn error(error: &Error, words: &Words) -> String {
+pub fn error(error: &Error, words: &Vocabulary) -> String {
     match error {
         Error::Option { key, cause } => format!("{}: {cause}{}", words.key(key), words.of_key(cause)),
         Error::Preset { .. } => format!("{}: {error}", words.preset),
@@ -110,7 +110,7 @@ pub fn error(error: &Error, words: &Words) -> String {
 
 /// A warning with its remedy.
 #[must_use]
-pub fn warning(warning: &Warning, Words { min, max, mask, orient, rectify, .. }: &Words) -> String {
+pub fn warning(warning: &Warning, Vocabulary { min, max, mask, orient, rectify, .. }: &Vocabulary) -> String {
     let remedy = match warning {
         Warning::Oriented { .. } => and(": turn them upright by ", *orient),
         Warning::NotRectified { .. } => and(": use ", *rectify),
@@ -125,9 +125,9 @@ pub fn warning(warning: &Warning, Words { min, max, mask, orient, rectify, .. }:
     format!("{warning}{remedy}")
 }
 
-/// As [`warning`], of a pair that was rectified, by a calibration or else by its own matches: to rectify is no remedy any more.
+/// Like [`warning`], for a pair that was rectified by a calibration or by its own matches: rectifying is no remedy any more.
 #[must_use]
-pub fn of_rectified(warning: &Warning, calibrated: bool, words: &Words) -> String {
+pub fn of_rectified(warning: &Warning, calibrated: bool, words: &Vocabulary) -> String {
     let Warning::NotRectified { offset } = warning else { return self::warning(warning, words) };
     let why = if calibrated {
         "the calibration is not of these cameras as they are now, or not of images of this size"
@@ -140,7 +140,7 @@ pub fn of_rectified(warning: &Warning, calibrated: bool, words: &Words) -> Strin
 
 /// A doubt about a rectification, or about the calibration of a rectified pair, with its remedy.
 #[must_use]
-pub fn doubt(doubt: &Doubt, Words { unit, crop, .. }: &Words) -> String {
+pub fn doubt(doubt: &Doubt, Vocabulary { unit, crop, .. }: &Vocabulary) -> String {
     let remedy = match doubt {
         Doubt::OtherSize { .. } => and("; if they show another part, say which by ", *crop),
         Doubt::Baseline { .. } => and(": ", *unit),
@@ -152,12 +152,12 @@ pub fn doubt(doubt: &Doubt, Words { unit, crop, .. }: &Words) -> String {
     format!("{doubt}{remedy}")
 }
 
-/// `word` after what joins it; nothing without it.
+/// `word` after `joint`; empty if there is no word.
 fn and(joint: &str, word: Option<&str>) -> String {
     word.map_or_else(String::new, |word| format!("{joint}{word}"))
 }
 
-impl Words {
+impl Vocabulary {
     fn key(&self, key: &str) -> String {
         let [before, after] = self.key;
         format!("{before}{key}{after}")
@@ -190,7 +190,7 @@ impl Words {
         format!("{}: {cause}{remedy}", range.unwrap_or(end))
     }
 
-    /// What gives a range.
+    /// The option that gives a range.
     fn given_range(&self) -> String {
         self.range.map_or(self.max.into(), |range| format!("the {range}"))
     }

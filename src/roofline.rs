@@ -12,13 +12,13 @@ use crate::plan::Plan;
 use crate::stage::{Data, Volume, volume_shape};
 
 /// The message stages of `plan`, level by level. A backend records the time either of [`Stage::Flood`] or of
-/// the two stages that it consists of.
+/// the two stages that it combines.
 pub fn message_stages(plan: &Plan) -> impl Iterator<Item = Stage> + use<> {
     Stage::all(plan).into_iter().filter(|stage| stage.passes_messages())
 }
 
-/// Label updates of one run of `stage`: the number of dependency message values that it computes, which is
-/// pixels times labels (without padding, but with those that label windows leave out) times members per factor. It is 0 for
+/// Label updates of one run of `stage`: the dependency message values that it computes, which is pixels times
+/// labels (without padding, but including labels outside label windows) times members per factor. It is 0 for
 /// all other stages.
 #[must_use]
 pub fn label_updates(plan: &Plan, stage: Stage) -> u64 {
@@ -29,8 +29,8 @@ pub fn label_updates(plan: &Plan, stage: Stage) -> u64 {
     })
 }
 
-/// The smallest number of bytes that one run of `stage` moves, where the volumes of each level hold so many `cells`
-/// ([`Backend::cells`](crate::backend::Backend::cells)); 0 for a stage that is no message stage.
+/// The smallest number of bytes that one run of `stage` moves; 0 unless it is a message stage. `cells` is the
+/// number of cells that the volumes of each level hold ([`Backend::cells`](crate::backend::Backend::cells)).
 #[must_use]
 pub fn bytes(plan: &Plan, stage: Stage, cells: &[u64]) -> u64 {
     let stored = |volume: Volume| {
@@ -54,7 +54,7 @@ mod tests {
 
     #[test]
     fn every_volume_counts_once() {
-        // 15 pixels of 20 labels in 32 places, and 6 of 11 in 16; 5 members.
+        // 15 pixels of 20 labels, padded to 32, and 6 of 11, padded to 16; 5 members.
         for (preset, b) in [("default", 1), ("paper", 2)] {
             let plan = plan(preset);
             let (fine, coarse) = (15 * 32, 6 * 16);

@@ -1,16 +1,16 @@
-//! Video that holds still where the scene does.
+//! Temporal smoothing of the maps of a video.
 
 use crate::image::{Image, Plane};
 use crate::maps::{FRACTION, Maps, flag, has_disparity};
 
-/// A filter for the maps of a sequence: where the image does not change, the disparity follows its past, weighted by confidence.
+/// A temporal filter for disparity maps: where the image is unchanged, it averages over time by confidence.
 ///
-/// A map of its own knows nothing of the frames before, so noise makes still surfaces flicker. This keeps a mean of the last frames (open)
-/// wherever the left view of the rig shows the same as before. Where something moves, the disparity is that of the frame alone, so moving
-/// things leave no trail; with a camera that moves, that is almost everywhere. Raw disparities, confidence, validity and the map of the
-/// right view stay as they are.
+/// Each map is computed without the frames before, so noise makes static surfaces flicker. The filter keeps a
+/// mean of the last frames (open) wherever the left view does not change. Where something moves, the
+/// disparity is that of the frame alone, so moving objects leave no trail; with a moving camera, that is
+/// almost everywhere. Raw disparities, confidence, validity and the map of the right view do not change.
 ///
-/// It works in integers, on what a match has found: the maps depend on the sequence alone, on every device.
+/// It works in integers, so the maps depend on the sequence alone, on every device.
 ///
 /// ```
 /// use mrfgs::steady::Steady;
@@ -32,39 +32,39 @@ pub struct Steady {
     past: Option<Past>,
 }
 
-/// What is known of the frames before.
+/// The state from the frames before.
 #[derive(Clone, Debug)]
 struct Past {
-    /// What the left view shows, grey: a mean of the last frames where it has not changed, else the last one.
+    /// The grey left view: a mean of the last frames where it did not change, else the last frame.
     view: Plane<u16>,
-    /// The disparity so far, in 1/256 px.
+    /// The mean disparity, in 1/256 px.
     disparity: Plane<i32>,
-    /// What it weighs, in 1/16 of a step of confidence; 0 where there is none.
+    /// The weight of the disparity, in 1/16 of a step of confidence; 0 where there is none.
     weight: Plane<u16>,
 }
 
-/// A frame that is measured weighs 16 (confidence + 1), one that is filled in 16.
+/// A measured pixel of a frame weighs 16 (confidence + 1), a filled one 16.
 const UNIT: u16 = 16;
-/// The past loses 1/8 of its weight with each frame: it remembers about eight of them.
+/// The past loses 1/8 of its weight with each frame, so it spans about eight frames.
 const FADING: u16 = 8;
-/// Disparities that differ by no more than half a pixel are one measurement with noise.
+/// Disparities that differ by at most half a pixel count as the same measurement with noise.
 const SAME: u32 = FRACTION as u32 / 2;
-/// A level of 8 bits.
+/// One level of 8 bits.
 const LEVEL: u32 = 256;
-/// Changes are looked at in windows of 5 x 5 pixels.
+/// Changes are summed over windows of 5 x 5 pixels.
 const RADIUS: usize = 2;
-/// How many pixels a window has.
+/// Pixels of a window.
 const WINDOW: u32 = 25;
 
 impl Steady {
-    /// A filter that has seen nothing yet.
+    /// A filter without a past.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Lets the disparities of the next frame follow their past. `left` is the left view that was matched. A frame of another size
-    /// begins a new sequence.
+    /// Smooths the disparities of the next frame. `left` is the left view that was matched. A frame of
+    /// another size begins a new sequence.
     ///
     /// # Panics
     /// When maps and image differ in size.
@@ -85,7 +85,7 @@ impl Steady {
     }
 }
 
-/// What a pixel of one frame weighs.
+/// The weight of a pixel of one frame.
 fn weight(confidence: u8, validity: u8) -> u16 {
     match (has_disparity(validity), validity & flag::INVALID) {
         (false, _) => 0,
@@ -95,7 +95,7 @@ fn weight(confidence: u8, validity: u8) -> u16 {
 }
 
 impl Past {
-    /// Makes of the view, the disparity and the weight of the next frame what is known with it.
+    /// Merges the past into the view, the disparity and the weight of the next frame.
     fn lead(&self, view: &mut Plane<u16>, disparity: &mut Plane<i32>, weight: &mut Plane<u16>) {
         let width = view.width();
         let rows = self.view.data().chunks(width).zip(view.data().chunks(width));
@@ -108,7 +108,7 @@ impl Past {
             if *change > limit {
                 continue;
             }
-            // A slow motion, too, leaves a mean behind.
+            // The view is averaged too, so a slow motion adds up to a change.
             *shown = (i32::from(showed) + (i32::from(*shown) - i32::from(showed)) / i32::from(FADING)) as u16;
             if *w == 0 || weighed == 0 {
                 continue;
@@ -116,22 +116,22 @@ impl Past {
             if d.abs_diff(before) <= SAME {
                 let both = weighed - weighed / FADING + *w;
                 let (whole, moved) = (i32::from(both), i32::from(*w) * (*d - before));
-                // Rounded to the nearest.
+                // Round to the nearest.
                 *d = before + (2 * moved + whole).div_euclid(2 * whole);
                 *w = both;
             } else if weighed / 2 > *w {
-                // A single frame says otherwise, and is less sure. It is believed soon if it goes on.
+                // A less confident frame disagrees: keep the past at half its weight; lasting changes win.
                 (*d, *w) = (before, weighed / 2);
             }
         }
     }
 }
 
-/// How much noise there may be in the windows of a view: how neighbours differ where they differ least, as no surface is plainer than the
-/// noise on it. This holds whatever moves.
+/// The most noise to expect in the windows of a view: the differences between neighbours where these are
+/// smallest, as no surface is smoother than its noise. Motion does not affect it.
 fn noise(view: &Plane<u16>) -> u32 {
     let sums = window_sums(view.width(), view.data().chunks(view.width()).map(beside));
-    // Borders of one colour, and what is too bright, hold none. Some of all windows tell as much.
+    // Borders of one colour and overexposed areas have no noise. A sample of the windows suffices.
     let mut some: Vec<u32> = sums.into_iter().step_by(7).filter(|sum| *sum > 0).collect();
     if some.is_empty() {
         return 0;
@@ -141,13 +141,13 @@ fn noise(view: &Plane<u16>) -> u32 {
     (*plainest).min(8 * LEVEL * WINDOW)
 }
 
-/// The differences of the pixels of a row to the next ones.
+/// The absolute differences between the pixels of a row and their next ones.
 fn beside(row: &[u16]) -> Vec<u16> {
     let next = row.iter().skip(1).chain(row.last());
     row.iter().zip(next).map(|(a, b)| a.abs_diff(*b)).collect()
 }
 
-/// The sums of the windows of a plane, from its rows. Beyond its border a plane has the values of the border.
+/// Window sums of each pixel from the rows of a plane, whose border is repeated.
 fn window_sums(width: usize, rows: impl Iterator<Item = Vec<u16>>) -> Vec<u32> {
     let mut padded = vec![0; width + 2 * RADIUS];
     let across: Vec<Vec<u32>> = rows
@@ -183,7 +183,7 @@ mod tests {
 
     const SIZE: (usize, usize) = (24, 20);
 
-    /// A view whose right half shows another thing from `step` 1 on.
+    /// A view whose right half changes from `step` 1 on, if `changed`.
     fn view(step: u32, changed: bool) -> Image {
         let level = |x: usize, y: usize| {
             let noise = (x as u32 * 7 + y as u32 * 13 + step * 5) % 3;
@@ -204,7 +204,7 @@ mod tests {
         }
     }
 
-    /// What a frame becomes after the others, at (4, 10) and at (20, 10), which may change.
+    /// The disparities of the last frame at (4, 10) and at (20, 10), of which the second may change.
     fn after(frames: &[(i32, u8, u8)], changed: bool) -> [i32; 2] {
         let mut steady = Steady::new();
         let mut found = maps(0, 0, 0);
@@ -219,39 +219,39 @@ mod tests {
     }
 
     #[test]
-    fn where_nothing_changes_it_is_a_mean_by_confidence() {
+    fn a_static_view_gives_a_mean_weighted_by_confidence() {
         // The past has lost an eighth of its weight: 1000 at 14 of 16, 1064 at 16.
         assert_eq!(after(&[(1000, 59, 0), (1064, 59, 0)], false), [1034; 2]);
-        // What is filled in hardly counts.
+        // Filled pixels hardly count.
         assert_eq!(after(&[(1000, 59, 0), (1064, 59, flag::OCCLUDED | flag::FILLED)], false), [1001; 2]);
         assert_eq!(after(&[(1000, 59, flag::OCCLUDED | flag::FILLED), (1064, 59, 0)], false), [1063; 2]);
     }
 
     #[test]
-    fn where_the_view_changes_the_past_is_forgotten() {
+    fn a_change_of_the_view_discards_the_past() {
         assert_eq!(after(&[(1000, 59, 0), (1064, 59, 0)], true), [1034, 1064]);
     }
 
     #[test]
-    fn a_jump_is_believed_when_it_goes_on_or_is_surer() {
+    fn a_jump_wins_if_it_persists_or_is_more_confident() {
         let far = 5000;
         assert_eq!(after(&[(1000, 59, 0), (far, 20, 0)], false), [1000; 2]);
         assert_eq!(after(&[(1000, 59, 0), (far, 20, 0), (far, 20, 0)], false), [far; 2]);
         assert_eq!(after(&[(1000, 59, 0), (far, 59, 0)], false), [far; 2]);
-        // Half a pixel apart is no jump.
+        // Half a pixel is no jump.
         assert_eq!(after(&[(1000, 59, 0), (1128, 59, 0)], false), [1068; 2]);
         assert_eq!(after(&[(1000, 59, 0), (1129, 59, 0)], false), [1129; 2]);
     }
 
     #[test]
-    fn what_has_no_disparity_leads_nothing() {
+    fn pixels_without_a_disparity_do_not_count() {
         let none = flag::OCCLUDED;
         assert_eq!(after(&[(1000, 59, none), (1064, 59, 0)], false), [1064; 2]);
         assert_eq!(after(&[(1000, 59, 0), (7, 0, none), (1064, 59, 0)], false), [1064; 2]);
     }
 
     #[test]
-    fn another_size_begins_anew() {
+    fn another_size_begins_a_new_sequence() {
         let mut steady = Steady::new();
         let mut found = maps(1000, 59, 0);
         steady.follow(&view(0, false), &mut found);

@@ -1,4 +1,4 @@
-//! Text from outside: small files, such as calibrations, config files and lists, and what messages quote of them.
+//! Small text files, such as calibrations, config files and lists, and quotations in messages.
 
 use std::fs::File;
 use std::io::Read;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// Reads a whole file of at most `max_bytes`; `what` says what it should be: "config file".
+/// Reads a whole file of at most `max_bytes`; `what` is its kind, such as "config file".
 ///
 /// # Errors
 /// [`Error::Read`] when it cannot be read or is larger.
@@ -20,7 +20,7 @@ pub fn read(path: &Path, max_bytes: u64, what: &str) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// A text as a message may quote it: in one line, not longer than a glance, and nothing that moves a cursor.
+/// Text for quoting in a message: one line of limited length, without control characters.
 #[must_use]
 pub fn one_line(text: &str) -> String {
     const MAX_LENGTH: usize = 160;
@@ -32,7 +32,7 @@ pub fn one_line(text: &str) -> String {
     }
 }
 
-/// What a user gave, as a message may quote it: not longer than a glance, and without what a terminal would obey.
+/// Input of a user for quoting in a message: of limited length, with control characters escaped.
 #[must_use]
 pub fn quoted(text: &str) -> String {
     const MAX_LENGTH: usize = 60;
@@ -42,7 +42,7 @@ pub fn quoted(text: &str) -> String {
     format!("`{shown}{more}`")
 }
 
-/// How many letters of a word are to be put in, left out or replaced to make it another one, whatever their case.
+/// The edit distance between two words, ignoring case: letters to insert, delete or replace.
 pub(crate) fn letters_apart(one: &str, other: &str) -> usize {
     let (one, other) = (one.to_lowercase(), other.to_lowercase());
     let mut row: Vec<usize> = (0..=other.chars().count()).collect();
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn letters_between_words_are_counted() {
+    fn edit_distances_are_counted() {
         for (one, other, letters) in [
             ("ndisp", "ndisp", 0),
             ("NDISP", "ndisp", 0),

@@ -1,7 +1,7 @@
-//! Threads: how many there are where nobody says it, and those that work beside matchers.
+//! The default number of threads, and the threads outside matchers.
 //!
-//! A matcher has threads of its own. All else that is shared among threads (reading, rectification, checks) is done by threads that all of
-//! the process has together, or by those of the `rayon` pool that it is called from. A process that is forked has its own.
+//! Each matcher has its own threads. All other parallel work (reading, rectification, checks) runs on one
+//! pool of the process, or on the `rayon` pool from which it is called. A forked process makes its own pool.
 
 #[cfg(not(target_arch = "wasm32"))]
 use crate::error::Purpose;
@@ -19,33 +19,33 @@ use std::sync::{Arc, Mutex, PoisonError};
 #[cfg_attr(target_arch = "wasm32", path = "threads/prelude_in_browser.rs")]
 pub(crate) mod prelude;
 
-/// The largest number of threads: more than any match can share, and few enough for every system.
+/// The largest number of threads: more than any match can use, and few enough for every system.
 pub(crate) const MOST: usize = 1024;
 
 /// Bytes of a thread's stack.
 #[cfg(not(target_arch = "wasm32"))]
 const STACK: u64 = 2 << 20;
 
-/// Threads for each processor, at most: more of them only wait for each other, longer and longer.
+/// Most threads per processor: more would only wait for each other.
 #[cfg(not(target_arch = "wasm32"))]
 const PER_PROCESSOR: usize = 4;
 
-/// Pixels for each thread, at least: with fewer it takes longer to hand out the work than to do it. A few threads do no harm.
+/// Least pixels per thread: with fewer, distributing the work takes longer than doing it. [`FEW`] threads are always allowed.
 #[cfg(not(target_arch = "wasm32"))]
 const PIXELS: usize = 1024;
 #[cfg(not(target_arch = "wasm32"))]
 const FEW: usize = 8;
 
-/// What may hold fewer threads than the machine has processors: what other programs go by, and what Slurm grants to a task.
+/// Environment variables that limit the threads: conventions of other programs, and Slurm's grants.
 const VARIABLES: [&str; 4] =
     ["RAYON_NUM_THREADS", "OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK", "SLURM_CPUS_ON_NODE"];
 
-/// The processors that the system lets this process use: affinity and the quotas of cgroups count.
+/// The processors that this process may use, with affinity and cgroup quotas.
 fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// How many threads there are where nobody says it: as many as processors that the system lets this process use, or fewer where
+/// The default number of threads: the processors that this process may use, or less where
 /// `RAYON_NUM_THREADS`, `OMP_NUM_THREADS`, `SLURM_CPUS_PER_TASK` or `SLURM_CPUS_ON_NODE` is a smaller number.
 #[must_use]
 pub fn usual() -> usize {
@@ -55,14 +55,14 @@ pub fn usual() -> usize {
 fn usual_of(processors: usize, variable: impl Fn(&str) -> Option<String>) -> usize {
     let number = |name: &&str| {
         let text = variable(name)?;
-        // OpenMP has one for each level of threads that begin others.
+        // OpenMP takes a list with one number for each nesting level.
         let first = text.split(',').next()?;
         first.trim().parse().ok().filter(|count| *count > 0)
     };
     VARIABLES.iter().filter_map(number).fold(processors, usize::min).max(1)
 }
 
-/// Refuses numbers of threads that there may not be.
+/// Refuses a number of threads outside 1 to [`MOST`].
 fn check(count: Option<usize>) -> Result<()> {
     match count.filter(|count| !(1..=MOST).contains(count)) {
         Some(wanted) => Err(ExecutionError::ThreadCount { wanted, most: MOST }.into()),
@@ -70,10 +70,10 @@ fn check(count: Option<usize>) -> Result<()> {
     }
 }
 
-/// Threads for one purpose, which begin when they are needed. A browser has one alone.
+/// A thread pool for one purpose, started when it is first needed. A browser has a single thread.
 #[derive(Debug)]
 pub(crate) struct Threads {
-    /// How many are wanted; 0 for the usual number.
+    /// The requested number of threads; 0 for the default.
     wanted: AtomicUsize,
     #[cfg(not(target_arch = "wasm32"))]
     kept: PerProcess<Mutex<Option<Kept>>>,
@@ -96,11 +96,11 @@ impl Threads {
         }
     }
 
-    /// So many threads at most, or the [usual](usual) number.
+    /// At most `count` threads, or the [default](usual) number.
     ///
     /// # Errors
-    /// [`ExecutionError`] for none at all, and for more than [`MOST`]; [`MemoryError`](crate::error::MemoryError) where their stacks do
-    /// not fit.
+    /// [`ExecutionError`] for 0 and for more than [`MOST`]; [`MemoryError`](crate::error::MemoryError) if
+    /// their stacks do not fit.
     pub(crate) fn new(count: Option<usize>) -> Result<Self> {
         check(count)?;
         #[cfg(not(target_arch = "wasm32"))]
@@ -111,10 +111,10 @@ impl Threads {
 
 #[cfg(not(target_arch = "wasm32"))]
 impl Threads {
-    /// The threads for work on so many pixels.
+    /// The pool for work on `pixels` pixels.
     ///
     /// # Errors
-    /// [`ExecutionError`] where the system does not start them.
+    /// [`ExecutionError`] if the system does not start them.
     pub(crate) fn pool(&self, pixels: usize) -> Result<Arc<ThreadPool>> {
         let mut kept = self.kept.get().lock().unwrap_or_else(PoisonError::into_inner);
         let (processors, usual) =
@@ -127,19 +127,19 @@ impl Threads {
         if let Some(kept) = kept.as_ref().filter(|kept| kept.pool.current_num_threads() == count) {
             return Ok(Arc::clone(&kept.pool));
         }
-        // Those before end when nobody uses them any more.
+        // The old threads end when their last user drops them.
         let pool = ThreadPoolBuilder::new().num_threads(count).stack_size(STACK as usize).build();
         let pool = Arc::new(pool.map_err(|e| ExecutionError::Threads(e.to_string()))?);
-        // A thread takes memory when it begins. All have begun before anybody counts what is left.
+        // A thread takes memory when it starts. Start all of them before anything measures the free memory.
         pool.broadcast(|_| ());
         *kept = Some(Kept { processors, usual, pool: Arc::clone(&pool) });
         Ok(pool)
     }
 
-    /// Does `work` on so many pixels there. Who awaits this waits for it.
+    /// Runs `work` on `pixels` pixels in the pool, and blocks until it is done.
     ///
     /// # Errors
-    /// [`ExecutionError`] where the system does not start the threads.
+    /// [`ExecutionError`] if the system does not start the threads.
     #[allow(clippy::unused_async, reason = "it has something to await in a browser")]
     pub(crate) async fn run<T: Send>(
         &self,
@@ -157,35 +157,34 @@ impl Threads {
     }
 }
 
-/// Those of no matcher.
+/// The threads outside matchers.
 static SHARED: Threads = Threads::usual();
 
-/// No more than `count` threads work beside matchers from now on; 0 stands for the [usual](usual) number.
+/// Limits the threads outside matchers to `count`; 0 stands for the [default](usual) number.
 pub fn limit(count: usize) {
     SHARED.wanted.store(count, Ordering::Relaxed);
 }
 
-/// Does `work` where it can be shared among threads: those of the pool of `rayon` that this is called from, or else those that all of the
-/// process has together.
+/// Runs `work` in the `rayon` pool from which this is called, or else in the pool of the process.
 pub fn run<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     #[cfg(not(target_arch = "wasm32"))]
     if rayon::current_thread_index().is_none() {
         match SHARED.pool(usize::MAX) {
             Ok(pool) => return pool.install(work),
-            // This thread does it by itself.
+            // Run it on this thread alone.
             Err(_) => drop(ThreadPoolBuilder::new().num_threads(1).use_current_thread().build()),
         }
     }
     work()
 }
 
-/// How many threads there are for [`run`].
+/// The number of threads of [`run`].
 #[must_use]
 pub fn count() -> usize {
     run(prelude::current_num_threads)
 }
 
-/// Does both, at the same time where there are threads for it.
+/// Runs both, in parallel if there are threads.
 pub fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     run(|| prelude::join(a, b))
 }
@@ -196,7 +195,7 @@ mod tests {
     use crate::error::Error;
 
     #[test]
-    fn numbers_that_no_machine_has_are_refused() {
+    fn impossible_numbers_of_threads_are_refused() {
         for wanted in [0, 1025, usize::MAX] {
             let Err(Error::Execution(error)) = Threads::new(Some(wanted)) else { panic!("{wanted}") };
             assert_eq!(error, ExecutionError::ThreadCount { wanted, most: 1024 });
@@ -205,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn the_environment_says_how_many_are_usual() {
+    fn environment_variables_lower_the_default() {
         for (variables, expected) in [
             (&[][..], 8),
             (&[("OMP_NUM_THREADS", "3")], 3),
@@ -213,9 +212,9 @@ mod tests {
             (&[("RAYON_NUM_THREADS", "2")], 2),
             (&[("SLURM_CPUS_PER_TASK", "1")], 1),
             (&[("SLURM_CPUS_ON_NODE", "1")], 1),
-            // The smallest of all.
+            // The smallest of all variables.
             (&[("SLURM_CPUS_ON_NODE", "6"), ("SLURM_CPUS_PER_TASK", "4"), ("OMP_NUM_THREADS", "5")], 4),
-            // What is no number of threads says nothing, and none gives more than there are processors.
+            // Values that are no positive number are ignored, and no value exceeds the number of processors.
             (&[("OMP_NUM_THREADS", "0")], 8),
             (&[("OMP_NUM_THREADS", ""), ("RAYON_NUM_THREADS", "many"), ("SLURM_CPUS_PER_TASK", "-1")], 8),
             (&[("OMP_NUM_THREADS", "64")], 8),
@@ -230,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn there_are_no_more_than_the_work_takes() {
+    fn small_work_gets_few_threads() {
         let (many, one) = (Threads::new(Some(MOST)).unwrap(), Threads::new(Some(1)).unwrap());
         let count = |threads: &Threads, pixels: usize| threads.pool(pixels).unwrap().current_num_threads();
         let most = PER_PROCESSOR * processors();
@@ -238,7 +237,7 @@ mod tests {
             assert_eq!(count(&many, pixels), expected.min(most), "{pixels} pixels");
             assert_eq!(count(&one, pixels), 1);
         }
-        // The same as long as they suffice.
+        // The pool is kept while its size fits.
         assert!(Arc::ptr_eq(&many.pool(0).unwrap(), &many.pool(PIXELS).unwrap()));
     }
 }

@@ -1,4 +1,4 @@
-//! Progress of a running match, its times on the host, and how it is interrupted.
+//! Progress of a running match, its host times, and its interruption.
 
 use crate::error::{Error, Result};
 use std::ops::ControlFlow;
@@ -9,32 +9,32 @@ use web_time::Instant;
 /// Progress of a match.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// The stage about to run, or a step of the host between stages: "zones", "upload" and so on.
+    /// The next stage, or a host step between stages: "zones", "upload" and so on.
     pub stage: &'static str,
     /// Fraction of the work that is done, 0 to 1.
     pub done: f64,
-    /// The current tile, counted from 1, and the number of tiles: twice that of the image where it is matched
-    /// twice.
+    /// The current tile, counted from 1, and the number of tiles. If the image is matched at two sizes, the
+    /// tiles of both count.
     pub tile: Option<(usize, usize)>,
 }
 
 /// Receives the progress of a match, and decides whether it continues.
 pub type Observer<'a> = &'a mut (dyn FnMut(Progress) -> ControlFlow<()> + Send);
 
-/// A break once one of `stops` is true.
+/// Breaks if any of `stops` is true.
 pub(crate) fn goes_on<const N: usize>(stops: [&AtomicBool; N]) -> ControlFlow<()> {
     let stopped = stops.iter().any(|stop| stop.load(Ordering::Relaxed));
     if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
-/// How far a match has come.
+/// The progress so far.
 #[derive(Clone, Debug, Default)]
 pub struct Followed {
     done: f64,
     total: f64,
     /// The current tile, and the number of tiles.
     pub tile: Option<(usize, usize)>,
-    /// The steps of the host so far, and the time of each.
+    /// The host steps so far, and the time of each.
     pub times: Vec<(&'static str, Duration)>,
 }
 
@@ -46,20 +46,20 @@ impl Followed {
     }
 }
 
-/// Follows a match: its progress, and the time of the host's steps between stages.
+/// Reports the progress of a match, and times its host steps.
 pub struct Watch<'a> {
     observer: Observer<'a>,
-    /// How far it has come.
+    /// The progress so far.
     pub followed: Followed,
 }
 
 impl<'a> Watch<'a> {
-    /// Follows a match from here on.
+    /// Continues from `followed`.
     pub fn new(observer: Observer<'a>, followed: Followed) -> Self {
         Self { observer, followed }
     }
 
-    /// Starts `stage`, whose share of the work is `work`, in the unit of the total.
+    /// Reports the start of `stage`, whose share of the work is `work`, in the unit of the total.
     ///
     /// # Errors
     /// [`Error::Interrupted`] when the observer breaks.
@@ -73,7 +73,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Runs a step of the host, and records its time.
+    /// Runs a host step, and records its time.
     ///
     /// # Errors
     /// [`Error::Interrupted`] when the observer breaks, and the errors of `job`.
@@ -85,10 +85,10 @@ impl<'a> Watch<'a> {
         Ok(done)
     }
 
-    /// As [`Self::host`], for a step that waits for a device.
+    /// Like [`Self::host`], for a step that waits for a device.
     ///
     /// # Errors
-    /// Those of [`Self::host`].
+    /// The errors of [`Self::host`].
     pub async fn host_async<T>(
         &mut self,
         name: &'static str,

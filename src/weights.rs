@@ -1,21 +1,21 @@
-//! Weights as tables of integers: those of the median's window, and those of votes.
+//! Tables of integer weights: for the median's window, and for votes.
 
 use crate::options::Method;
 
-/// Weight of the centre of the median's window, the largest there is.
+/// Weight of the centre of the median's window, the largest weight.
 pub const MEDIAN_WEIGHT: u8 = 127;
 /// The largest part of the centre's weight that distance alone subtracts.
 const MEDIAN_SPACE: f64 = 96.0;
-/// Every second row of a window is used, with all of its columns: 2 to this many.
+/// The row spacing in the windows of the median is 2 to this many pixels; all columns are used.
 pub const WINDOW_ROW_BITS: u32 = 1;
-/// How far apart the places of the windows of filled pixels are, one window after the other, along rows and along columns: 2 to so many
-/// pixels. The first sees far in all directions. The second sees along rows, since there roads and floors stay at one disparity.
+/// Spacing of the places in the two windows that fill pixels, along rows and along columns: 2 to this many pixels.
+/// The first window reaches far in all directions, the second along rows, where roads and floors keep one disparity.
 pub const FILL_STEP_BITS: [[u32; 2]; 2] = [[3, 3], [4, 0]];
 /// Side of these windows, in places.
 const FILL_WINDOW: usize = 13;
-/// Their spatial parameter, in places.
+/// Spatial sigma of these windows, in places.
 const FILL_SIGMA_SPACE: f64 = 4.3;
-/// Their range sigma is smaller than the median's by this factor.
+/// Their range sigma is the median's divided by this.
 const FILL_SIGMA_RANGE: f64 = 3.0;
 
 /// Number of differences in colour: the sum over three channels of 8 bits.
@@ -23,7 +23,7 @@ pub const COLOUR_DIFFERENCES: usize = 3 * 255 + 1;
 /// Weight of a vote after a step along a row and along a column, between half-size pixels of the same colour: about
 /// exp(-sqrt(2) / 134) and exp(-sqrt(2) / 6.7). Disparities change from row to row on the ground, and stay along rows.
 const VOTE_STEP: [f64; 2] = [0.9895, 0.81];
-/// What a difference of one level takes off the logarithm of that weight.
+/// The decrease of that weight's logarithm per level of colour difference.
 const VOTE_EDGE: f64 = 0.0345;
 
 /// Weights of votes after a step along a row, and along a column, in 1/65536, by the difference d in colour between the two
@@ -36,14 +36,14 @@ pub fn vote_weights() -> [Vec<u32>; 2] {
     VOTE_STEP.map(|step| (0..COLOUR_DIFFERENCES).map(|difference| weight(step, difference)).collect())
 }
 
-/// Share of its weight that what a patch knows keeps on the way to the next one, where both have one colour: about exp(-sqrt(2) / 37.5).
+/// Share of the weight that passes from a patch to the next one of the same colour: about exp(-sqrt(2) / 37.5).
 const PATCH_FADE: f64 = 0.961;
-/// What a difference of one level takes off the logarithm of that share.
+/// The decrease of that share's logarithm per level of colour difference.
 const PATCH_EDGE: f64 = 0.0185;
-/// From this difference on, nothing is left.
+/// From this difference on, the share is 0.
 pub const PATCH_DIFFERENCES: usize = 336;
 
-/// Share of its weight, in 1/256, that what a patch knows keeps on the way to the next one, by the difference d between both:
+/// Share of the weight that passes from a patch to the next one, in 1/256, by the difference d in colour:
 /// round(256 x 0.961 exp(-0.0185 d)), and 0 at the last.
 #[must_use]
 pub fn patch_weights() -> Vec<u32> {
@@ -58,15 +58,15 @@ pub fn patch_weights() -> Vec<u32> {
 /// the 16-bit channel times `scale` >> 16. `scale` / 256 times 2^`doublings` is 0.1 / `sigma_range`: a
 /// difference of 1270 `sigma_range` 8-bit levels, summed over the channels, takes all of the weight.
 ///
-/// A straight line stands for the Gaussian of colour, and a sum for the product of both: this is as accurate,
-/// and fits in bytes throughout.
+/// A straight line approximates the Gaussian of colour, and a sum replaces the product of both: this is as
+/// accurate, and fits in bytes throughout.
 #[derive(Clone, Debug)]
 pub struct MedianWeights {
     /// Radius of the window, in steps.
     pub radius: usize,
     /// Spacing of the window's places along rows and along columns: 2 to this many pixels.
     pub step_bits: [u32; 2],
-    /// Whether every second place counts alone, as on a checkerboard: those with dx + dy / 2 even, in steps of the window.
+    /// Whether only every second place counts, as on a checkerboard: those with dx + dy / 2 even, in steps of the window.
     pub checkered: bool,
     /// By |dy| and by dx from -radius to radius, in steps of the window, \[dy\]\[dx\].
     space: Vec<u8>,
@@ -85,14 +85,14 @@ impl MedianWeights {
         Self::new(window, refinement.median_sigma_space, refinement.median_sigma_range)
     }
 
-    /// Those of planes, and of the medians that planes start from: every second place.
+    /// The weights for fitting planes, and for the medians that planes start from: every second place.
     #[must_use]
     pub fn of_planes(method: &Method) -> Self {
         Self { checkered: true, ..Self::of(method) }
     }
 
-    /// The weights of filled pixels, in a window of 13 x 13 places that are 2 to `step_bits` pixels apart, along rows and along columns:
-    /// with a spatial parameter of 4.3 places, and a third of the range parameter.
+    /// The weights for filled pixels, in a window of 13 x 13 places that are 2 to `step_bits` pixels apart
+    /// along rows and along columns: with a spatial sigma of 4.3 places, and a third of the range sigma.
     #[must_use]
     pub fn of_filled(method: &Method, step_bits: [u32; 2]) -> Self {
         let range = method.refinement.median_sigma_range / FILL_SIGMA_RANGE;
@@ -119,7 +119,7 @@ impl MedianWeights {
         Self { radius, step_bits: [0; 2], checkered: false, space, scale, doublings }
     }
 
-    /// The weight that distance subtracts, by |dy| and |dx|, as the shader reads it.
+    /// The weight that distance subtracts, by |dy| and |dx|, in the layout of the shader.
     #[must_use]
     pub fn words(&self) -> Vec<u32> {
         let rows = self.space.chunks_exact(2 * self.radius + 1).flat_map(|row| &row[self.radius..]);
@@ -139,20 +139,20 @@ mod tests {
     use super::*;
     use crate::plan::votes::{VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_SHIFT};
 
-    /// In an image of one colour, however large, with the largest own votes everywhere.
+    /// The worst case: a large image of one colour with the largest votes everywhere.
     #[test]
     fn sums_of_votes_fit_in_32_bits() {
         let vote = (VOTE_MOST as u64 >> VOTE_BITS).max(VOTE_HIDING.into());
         let own = (4 * vote) << VOTE_FRACTION_BITS;
         let [row, column] = vote_weights().map(|weights| u64::from(weights[0]));
-        // What comes from one side, once it no longer grows.
+        // The limit of the votes that come from one side.
         let from_side = |own: u64, weight: u64| own * weight / (65536 - weight);
         let along_row = own + 2 * from_side(own, row);
         assert!(along_row <= u32::MAX.into(), "{along_row}");
         let summed = along_row >> VOTE_SHIFT;
         let in_all = summed + 2 * from_side(summed, column);
         assert!(in_all <= u32::MAX.into(), "{in_all}");
-        // Each bit that votes have is needed, and each that sums lose.
+        // The bits that votes keep are needed, and so are those that sums drop.
         assert!(2 * along_row > u32::MAX.into() && 2 * in_all > u32::MAX.into());
     }
 }

@@ -1,6 +1,6 @@
-//! Accuracy floors of the presets: always on rendered scenes, and on real pairs where
-//! `MRFGS_MIDDLEBURY` names their folder. The maps are integers, so the figures are the same on every
-//! machine. The floors leave a little room for changes that trade one figure for another.
+//! Accuracy limits of the presets: always on rendered scenes, and on real pairs if `MRFGS_MIDDLEBURY` names
+//! their folder. The maps are integers, so the figures are the same on every machine. The limits leave a
+//! little room for changes that trade one figure for another.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -41,7 +41,7 @@ fn report(folder: &Path, map: &Plane<f32>) -> Report {
     GroundTruth::new(truth(folder), Some(mask)).unwrap().evaluate(map).unwrap()
 }
 
-/// A map, and the same map in whole pixels.
+/// The final map, rounded to whole pixels.
 fn rounded(matched: &Matched) -> Plane<f32> {
     let map = &matched.maps.disparity;
     map.map(|&d| (d + FRACTION / 2).div_euclid(FRACTION) as f32)
@@ -80,12 +80,12 @@ fn rendered_scenes() {
     }
 }
 
-/// Two thirds of the pixels are off by less than sigma, or more of them: these scenes are cleaner than what it was fitted to. It knows
-/// which are off by more.
+/// At least two thirds of the pixels are off by less than sigma, which was fitted to less clean scenes, and
+/// sigma predicts which are off by more.
 #[test]
 fn sigma_is_the_size_of_the_errors() {
     for method in [Method::default(), Method::fast()] {
-        // Of each measured pixel: sigma, and by how much it is off.
+        // For each measured pixel, sigma and the error.
         let mut pixels = Vec::new();
         for scene in ["slanted", "thin", "mixed", "steep", "rows", "focus", "screen", "border", "behind"] {
             let folder = Path::new("testdata").join(scene);
@@ -107,7 +107,7 @@ fn sigma_is_the_size_of_the_errors() {
             println!("within 1, 2 and 3 sigma: {found:.1?} %");
             assert!((70.0..96.0).contains(&found[0]) && found[1] > 88.0 && found[2] > 91.0, "{found:?}");
         }
-        // Control: with the sigma of the surer half the other one would be far off.
+        // Control: with the sigma of the confident half, the other half would be far off.
         let sigma = sure[sure.len() / 2].0;
         let blind: Vec<_> = unsure.iter().map(|(_, off)| (sigma, *off)).collect();
         let (known, blind) = (within(unsure, 1.0), within(&blind, 1.0));
@@ -129,8 +129,8 @@ fn colour_counts_where_there_is_contrast() {
     assert!(in_full > 1.5 * weighed, "{in_full} against {weighed}");
 }
 
-/// With every view in a mirror of its own, disparities change their sign, and nearer surfaces have the smaller ones. Told so, the
-/// method finds nearly the same map; not told, it fills from the wrong side.
+/// Mirroring each view by itself negates disparities, so nearer surfaces have smaller ones. With the option
+/// set the method finds nearly the same map; without it, it fills from the wrong side.
 #[test]
 fn nearer_may_be_smaller() {
     for scene in ["slanted", "mixed", "steep"] {
@@ -144,7 +144,7 @@ fn nearer_may_be_smaller() {
             run(&mirrored, other, &method).maps.disparity.mirrored().map(|d| -d)
         };
         let map = run(&pair, range, &Method::default()).maps.disparity;
-        // Pixels that differ by more than a pixel, and bad2.0, in percent.
+        // Percentage of pixels that differ by more than a pixel, and bad2.0.
         let figures = |found: &Plane<i32>| {
             let off = map.data().iter().zip(found.data()).filter(|(a, b)| a.abs_diff(**b) > FRACTION as u32);
             let off = 100.0 * off.count() as f64 / map.data().len() as f64;
@@ -160,7 +160,7 @@ fn nearer_may_be_smaller() {
 #[test]
 fn real_pairs() {
     let Some(folder) = folder_of_pairs() else { return };
-    // Final: average error in pixels and bad2.0 in percent, with a little room. Raw: average error and bad2.0 of the paper's table 1.
+    // Limits of the final map: average error in pixels and bad2.0 in percent. Limits of the raw map: those of the paper's table 1.
     let floors = [
         ("Teddy", (0.50, 5.9), (2.09, 13.90)),
         ("Cones", (0.62, 6.3), (2.29, 16.52)),
@@ -181,7 +181,7 @@ fn real_pairs() {
     }
 }
 
-/// The folder of the real pairs; without one it says so.
+/// The folder of the real pairs; reports a skipped test if there is none.
 fn folder_of_pairs() -> Option<String> {
     let folder = std::env::var("MRFGS_MIDDLEBURY").ok();
     if folder.is_none() {
@@ -190,7 +190,7 @@ fn folder_of_pairs() -> Option<String> {
     folder
 }
 
-/// The preset `fast`, at half the size, loses two points of bad2.0, and no more; `accurate` is better than the default, above all within a pixel.
+/// The preset `fast`, at half the size, loses at most two points of bad2.0; `accurate` is better than the default, above all within a pixel.
 #[test]
 fn fast_and_accurate_on_real_pairs() {
     let Some(folder) = folder_of_pairs() else { return };
@@ -212,8 +212,8 @@ fn fast_and_accurate_on_real_pairs() {
     assert!(accurate.iter().zip(default).all(|(accurate, default)| *accurate < default));
 }
 
-/// The presets of the paper are as near to its tables as `docs/paper.md` says: means of average error, PSNR and bad2.0 over the
-/// five pairs, raw and final.
+/// The presets of the paper are as close to its tables as `docs/paper.md` says: means of average error, PSNR
+/// and bad2.0 over the five pairs, raw and final.
 #[test]
 fn the_papers_presets_on_real_pairs() {
     let Some(folder) = folder_of_pairs() else { return };
@@ -242,7 +242,7 @@ fn the_papers_presets_on_real_pairs() {
             assert!(avg <= floor[0] && psnr >= floor[1] && bad2 <= floor[2], "{preset}: {found:.2?}");
         }
     }
-    // Control: one reading turned costs three points.
+    // Control: changing one reading costs three points.
     let mut strict = Method::paper();
     strict.messages.agreement = Agreement::Strict;
     let [_, [_, _, bad2]] = means(&strict);

@@ -1,4 +1,4 @@
-//! Conditioning: faults of a rig are found, corrected, and told from scenes without them.
+//! Conditioning: faults of a rig are found and corrected, and sound scenes are left unchanged.
 
 use std::path::Path;
 
@@ -35,9 +35,9 @@ fn each_fault_is_found_in_its_scene() {
     let rows = found(&scene("rows").unwrap());
     let offset = f64::from(rows.offset) / f64::from(FRACTION);
     assert!((offset - 0.6).abs() < 0.1, "{rows:?}");
-    // It says nothing of smoothing.
+    // The description does not mention smoothing.
     assert_eq!(rows.to_string(), format!("the right view is moved up by {offset:.2} px"));
-    // Light from 5 x 5 pixels is spread as by a Gaussian of 1.44 pixels, but only what noise leaves of the detail tells so.
+    // Defocus by 5 x 5 pixels is as wide as a Gaussian of 1.44 pixels, but noise hides part of it.
     let focus = found(&scene("focus").unwrap());
     let [left, right] = focus.smoothing;
     assert!((left * left - right * right).sqrt() > 0.6 && left < 2.0 && focus.offset == 0, "{focus:?}");
@@ -46,7 +46,7 @@ fn each_fault_is_found_in_its_scene() {
     assert!(grain.to_string().starts_with("both views are smoothed by"), "{grain}");
 }
 
-/// The view as JPEG of this quality keeps it.
+/// The view after JPEG compression at this quality.
 fn compressed(view: &Image, quality: u8) -> Image {
     let (width, height) = view.pixels.size();
     let colours: Vec<u8> = view.to_rgb8().data().iter().flatten().copied().collect();
@@ -58,7 +58,7 @@ fn compressed(view: &Image, quality: u8) -> Image {
     Image::from_rgb8(&Plane::from_fn(width, height, |x, y| seen.get_pixel(x as u32, y as u32).0))
 }
 
-/// The lower the quality of JPEG, the more is smoothed, wherever the image is cut.
+/// The lower the JPEG quality, the more is smoothed, wherever the image is cropped.
 #[test]
 fn blocks_of_jpeg_are_smoothed() {
     let pair = scene("mixed").unwrap();
@@ -75,7 +75,7 @@ fn blocks_of_jpeg_are_smoothed() {
     assert!(smoothing(&cut) > 1.5);
 }
 
-/// With the views exchanged, the same faults have the other sign and the other side.
+/// Exchanging the views exchanges the sign and the side of the faults.
 #[test]
 fn exchanged_views_have_exchanged_faults() {
     let exchanged = |name| found(&scene(name).unwrap().mirrored());
@@ -86,9 +86,9 @@ fn exchanged_views_have_exchanged_faults() {
     assert!((0.8..1.25).contains(&ratio), "{there:?} and {back:?}");
 }
 
-/// Each correction earns its place where its fault is.
+/// Each correction improves the scene with its fault.
 #[test]
-fn what_is_corrected_is_matched_better() {
+fn corrected_pairs_are_matched_better() {
     let mut matcher = Matcher::builder().device("cpu").build().unwrap();
     for (name, key) in [("rows", "level-rows"), ("focus", "equal-sharpness"), ("grain", "denoise")] {
         let pair = scene(name).unwrap();
@@ -108,7 +108,7 @@ fn what_is_corrected_is_matched_better() {
     }
 }
 
-/// Off means off.
+/// The preset `paper` switches all corrections off.
 #[test]
 fn the_paper_corrects_no_rig() {
     for name in ["rows", "focus", "grain"] {
@@ -134,9 +134,9 @@ fn any_image_has_an_answer() {
     assert_eq!(found(&pair), Conditioning::default());
 }
 
-/// What is masked may hold anything.
+/// Masked pixels may have any value.
 #[test]
-fn masked_pixels_say_nothing() {
+fn masked_pixels_do_not_count() {
     for name in ["rows", "focus", "grain"] {
         let pair = scene(name).unwrap();
         let with = |hidden: u16| {
@@ -155,9 +155,9 @@ fn masked_pixels_say_nothing() {
     }
 }
 
-/// Tiles are cut from the corrected pair: the faults are those of the whole.
+/// Tiles are cut from the corrected pair, so the faults are those of the whole.
 #[test]
-fn tiles_share_what_was_found() {
+fn tiles_share_the_conditioning() {
     let pair = scene("rows").unwrap();
     let mut method = Method::default();
     method.set("memory", "15").unwrap();

@@ -1,4 +1,4 @@
-//! A pair matched at twice its size, too: the maps of both sizes are those of a naive twin, on both backends, and what holds of them.
+//! Matching at twice the size as well: the merged maps equal a naive twin's on both backends, and have the documented properties.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
@@ -37,7 +37,7 @@ fn accurate() -> Method {
     method
 }
 
-/// The method for the pair of its own size, and that for the pair at twice its size.
+/// The methods for the pair at its own size and at twice its size.
 fn both(method: &Method) -> [Method; 2] {
     let mut own = method.clone();
     own.schedule.match_size = MatchSize::Full;
@@ -53,7 +53,7 @@ fn both(method: &Method) -> [Method; 2] {
 /// A view of 8-bit levels at twice its size.
 fn doubled(image: &Image) -> Image {
     let (width, height) = image.pixels.size();
-    // Values of one channel along a line, at twice as many places.
+    // Interpolates values of one channel along a line to twice as many positions.
     let line = |values: &[i32]| -> Vec<i32> {
         let at = |i: i32| values[i.clamp(0, values.len() as i32 - 1) as usize];
         let sum = |taps: [i32; 4]| {
@@ -88,7 +88,7 @@ fn doubled(image: &Image) -> Image {
     Image { pixels, masked: Plane::filled(2 * width, 2 * height, false) }
 }
 
-/// What becomes of one pixel: disparity and validity, and whether what is measured at twice the size took its place.
+/// Merges one pixel: its disparity and validity, and whether they come from twice the size.
 fn joined(own: (i32, u8), four: [(i32, u8); 4]) -> (i32, u8, bool) {
     let mut values = four.map(|(d, _)| f64::from(d) / 2.0);
     values.sort_by(f64::total_cmp);
@@ -104,7 +104,7 @@ fn joined(own: (i32, u8), four: [(i32, u8); 4]) -> (i32, u8, bool) {
     (own.0, own.1, false)
 }
 
-/// The maps of both sizes as one; of which pixels, how many took what is measured at twice the size.
+/// The merged maps, and the number of pixels that come from twice the size.
 fn twin(own: &Maps, double: &Maps) -> (Maps, usize) {
     let (width, height) = own.disparity.size();
     let mut maps = own.clone();
@@ -128,7 +128,7 @@ fn twin(own: &Maps, double: &Maps) -> (Maps, usize) {
 }
 
 #[test]
-fn both_sizes_make_one_map() {
+fn both_sizes_are_merged() {
     let pair = scene("slanted");
     let larger = Pair::new(doubled(pair.left()), doubled(pair.right())).unwrap();
     for (fill, check) in [
@@ -145,7 +145,7 @@ fn both_sizes_make_one_map() {
         let found = matched(&pair, RANGE, &method);
         let (expected, taken) = twin(&own, &double);
         assert!(found == expected, "{fill:?}, {check:?}");
-        // Control: each case of the definition is there.
+        // Control: each case of the definition occurs.
         let changed = own.disparity.data().iter().zip(found.disparity.data()).filter(|(a, b)| a != b).count();
         assert!(taken > 10 && changed > 1000, "{fill:?}, {check:?}: {taken} taken, {changed} changed");
         assert!(found.right != own.right && found.confidence != own.confidence, "{fill:?}, {check:?}");
@@ -161,7 +161,7 @@ fn devices_agree() {
         let pair = scene(name);
         let method = accurate();
         let expected = matched(&pair, RANGE, &method);
-        // One after the other, and by itself.
+        // In sequence, and alone below.
         let pairs = [(pair.clone(), RANGE), (pair.clone(), RANGE)];
         matcher.set_method(method.clone());
         let mut count = 0;
@@ -173,13 +173,13 @@ fn devices_agree() {
             })
             .unwrap();
         assert_eq!(count, 2);
-        // Control: at its own size alone it is another map.
+        // Control: a match at its own size alone gives another map.
         let [own, _] = both(&method);
         assert!(matcher.job(&pair, RANGE).method(&own).run().unwrap().maps != expected, "{name}");
     }
 }
 
-/// A device keeps what both sizes take from match to match, as far as the memory of the method goes.
+/// A device keeps the buffers of both sizes between matches, as far as the memory of the method allows.
 #[test]
 fn both_sizes_stay_on_the_device() {
     let pair = scene("slanted");
@@ -198,14 +198,14 @@ fn both_sizes_stay_on_the_device() {
     let both = held(&[&all, &all]).unwrap();
     assert!(both[0] > 4 * alone[0], "{both:?}, {alone:?}");
     assert_eq!(both[0], both[1]);
-    // Control: as much as the larger one takes is not enough for both.
+    // Control: the memory of the larger size is not enough for both.
     let memory = (both[0] - alone[0] / 2) >> 20;
     all.set("memory", &memory.to_string()).unwrap();
     let larger = held(&[&all, &all]).unwrap();
     assert!(larger[1] < both[0] && larger[1] <= memory << 20, "{larger:?} of {memory} MiB, {both:?}");
 }
 
-/// What is wrong with a pair is corrected once, before it is enlarged.
+/// Faults of a pair are corrected once, before it is enlarged.
 #[test]
 fn the_larger_pair_is_conditioned() {
     let mut matcher = Matcher::builder().device("cpu").build().unwrap();
@@ -245,7 +245,7 @@ fn masked_pixels_stay_masked() {
     assert!(!has_disparity(maps.validity[(40, 40)]) && has_disparity(maps.validity[(42, 40)]));
 }
 
-/// Progress goes from 0 to 1 over both, and a pair that is cut into tiles is enlarged too.
+/// Progress goes from 0 to 1 over both sizes, and a pair that is cut into tiles is enlarged too.
 #[test]
 fn progress_and_tiles() {
     let pair = scene("slanted");

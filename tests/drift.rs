@@ -1,4 +1,4 @@
-//! Rigs whose right camera has turned since they were calibrated: how far, found in their frames, and taken back.
+//! Drift of the right camera since calibration: it is measured in frames and corrected.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -20,7 +20,7 @@ use raw::{CAMERAS, Camera};
 const SIZE: (usize, usize) = (640, 480);
 const RANGE: DisparityRange = DisparityRange { min: 0, max: 90 };
 
-/// What the rig sees, one after the other.
+/// The scenes that the rig sees, in sequence.
 static SCENES: LazyLock<Vec<scenes::Scene>> = LazyLock::new(|| {
     ["mixed", "slanted"].map(|name| scenes::render(name, 2 * SIZE.0, 2 * SIZE.1, 161)).into()
 });
@@ -35,10 +35,10 @@ fn cameras() -> [Camera; 2] {
     })
 }
 
-/// The same after the right one has turned, in degrees: by how far it looks up, to the right and clockwise.
+/// The cameras after the right one has turned, in degrees: up, to the right and clockwise.
 fn turned(degrees: [f64; 3]) -> [Camera; 2] {
     let [left, mut right] = cameras();
-    // A quaternion has half the angle, and rays turn the other way.
+    // A quaternion holds half the angle, and rays turn the opposite way to the camera.
     right.turn = raw::product(&raw::rotation(degrees.map(|angle| -0.5 * angle.to_radians())), &right.turn);
     [left, right]
 }
@@ -58,7 +58,7 @@ fn frames(cameras: &[Camera; 2]) -> Vec<Pair> {
     SCENES.iter().map(frame).collect()
 }
 
-/// What a sequence of these frames shows, each of them three times and then again, and whether it was corrected.
+/// The turn measured over such a sequence, each frame three times in a row, and whether it was corrected.
 fn followed(frames: &[Pair], correct: bool) -> (Turn, bool) {
     let calibrated = calibrated();
     let mut drift = Drift::of(&calibrated).unwrap();
@@ -77,11 +77,11 @@ fn followed(frames: &[Pair], correct: bool) -> (Turn, bool) {
 
 #[test]
 fn a_tenth_of_a_degree_is_found_to_a_hundredth() {
-    // Rows say less of a turn to a side.
+    // Rows constrain yaw less than pitch and roll.
     const MOST: [f64; 3] = [0.01, 0.02, 0.01];
     let degrees = [0.1, 0.1, -0.1];
     let frames = frames(&turned(degrees));
-    // In the frame of the rectified view.
+    // In the coordinates of the rectified view.
     let truth = raw::turned(&calibrated().rotations()[1], degrees);
     for correct in [false, true] {
         let (turn, corrected) = followed(&frames, correct);
@@ -95,7 +95,7 @@ fn a_tenth_of_a_degree_is_found_to_a_hundredth() {
 }
 
 #[test]
-fn a_rig_that_stands_as_it_was_calibrated_is_left_alone() {
+fn an_unmoved_rig_is_not_corrected() {
     let (turn, corrected) = followed(&frames(&cameras()), true);
     println!("{turn:?}");
     assert!(!corrected && !turn.counts(), "{turn:?}");

@@ -1,4 +1,4 @@
-//! Drivers stay loaded when the last device goes, since threads that have used them call them once more when they end.
+//! Drivers stay loaded after the last device is dropped, because threads that used one call it again when they exit.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -7,14 +7,14 @@ mod common;
 use mrfgs::low_level::backend::gpu::FaultInjection;
 use std::collections::BTreeSet;
 
-/// The libraries of this process.
+/// The shared libraries that this process has loaded.
 fn libraries() -> BTreeSet<String> {
     let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
     let files = maps.lines().filter_map(|line| line.split_whitespace().nth(5));
     files.filter(|file| file.contains(".so")).map(str::to_owned).collect()
 }
 
-// The only test of this process: no other one holds a device.
+// This must be the only test in this process, so that no other test holds a device.
 #[test]
 fn drivers_outlive_their_devices() {
     let before = libraries();

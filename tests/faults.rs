@@ -1,6 +1,5 @@
-//! Failing devices, in every way that can be provoked without a device that really fails. Each failure is
-//! reported in one clear line, and where falling back is allowed the maps come from the CPU path, bit for
-//! bit.
+//! Device failures of every kind that can be injected. Each is reported in one clear line, and where falling
+//! back is allowed the CPU path computes the same maps, bit for bit.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -61,7 +60,7 @@ fn says(cause: &impl ToString, words: &str) -> bool {
     cause.to_string().contains(words) && is_clear(cause.to_string())
 }
 
-/// The result of falling back: the maps of the CPU path, and a note with the reason.
+/// Checks that the maps come from the CPU path, and that the note gives the reason.
 fn assert_falls_back(gpu: Result<Gpu>, says: &str) {
     let (pair, range) = scene();
     let mut matcher = Matcher::on(gpu, true, &Execution::default()).unwrap();
@@ -84,7 +83,7 @@ fn a_good_device_is_used() {
     assert!(matched.note.is_none() && !matched.ran_on.contains("CPU path"), "{}", matched.ran_on);
 }
 
-/// A device that is lost before the first stage, at any later one, or while the maps are read back.
+/// The device is lost before the first stage, at a later one, or while the maps are read back.
 #[test]
 fn lost() {
     let (pair, range) = scene();
@@ -119,9 +118,9 @@ fn lost() {
     }
 }
 
-/// Where falling back is not allowed, the failure is returned.
+/// Where falling back is not allowed, the error is returned.
 #[test]
-fn lost_without_a_way_back() {
+fn lost_without_a_fallback() {
     let Some(gpu) = device(FaultInjection { lost_after: Some(3), ..FaultInjection::default() }) else {
         return;
     };
@@ -158,7 +157,7 @@ fn out_of_memory() {
     assert!(!matched.ran_on.contains("CPU path") && matched.note.is_none(), "{}", matched.ran_on);
 }
 
-/// Buffers and bindings that are too small for a single row.
+/// Buffers and bindings too small for a single row.
 #[test]
 fn too_small() {
     let (pair, range) = scene();
@@ -199,13 +198,13 @@ fn refuses_a_shader() {
     assert_falls_back(Ok(gpu), "workgroup");
 }
 
-/// A driver that accepts everything and computes nothing, or something wrong: a small pair reveals it.
+/// A driver that computes nothing, or wrong values: the self-test on a small pair detects it.
 #[test]
 fn computes_nothing() {
     let faults = FaultInjection { noop: true, ..FaultInjection::default() };
     let gpu = || Gpu::with_faults(None, faults);
     let (pair, range) = scene();
-    // It does not even report an error.
+    // This driver does not even report an error.
     assert!(on(&mut gpu().unwrap(), &pair, range).unwrap().maps != expected(&pair, range));
     assert_falls_back(gpu(), "self-test");
     let mut matcher = Matcher::on(gpu(), false, &Execution::default()).unwrap();
@@ -224,7 +223,7 @@ fn a_device_without_a_clock() {
         let matched = run(&mut matcher, &pair, range).unwrap();
         assert!(matched.maps == expected(&pair, range));
         let of = |stage| matched.timings.iter().filter(move |t| t.stage == stage);
-        // The host cannot look between the two stages of a sweep.
+        // The host records no times between the two stages of a sweep.
         let sweep = if no_clock { "flood" } else { "dependency" };
         assert_eq!(of(sweep).count(), matched.plan.levels.len());
         assert_eq!(of("graph").count(), matched.plan.levels.len());

@@ -1,4 +1,4 @@
-//! The front end on whole images: invariances, expected results, and small and empty images.
+//! The front end on whole images: invariants, expected results, and small or empty images.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -21,7 +21,7 @@ fn scene(name: &str) -> Image {
     pair.expect("the scenes are there").left().clone()
 }
 
-/// The paper's clusters, each a zone.
+/// Every cluster is one zone, as in the paper.
 fn clusters() -> Options {
     Options { extent: ZoneExtent::Cluster, ..Options::default() }
 }
@@ -63,8 +63,8 @@ fn with_threads<T: Send>(threads: usize, f: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads").install(f)
 }
 
-/// Whether all zones of a map are used and numbered by their first pixels, and the masked pixels are exactly
-/// those of the image.
+/// Checks that all zones are used and numbered in the order of their first pixels, and that exactly the
+/// masked pixels of the image have none.
 fn assert_well_formed(zones: &Zones, image: &Image) {
     assert_eq!(zones.map.size(), image.pixels.size());
     let mut seen = 0;
@@ -115,7 +115,7 @@ fn uniform_images_become_mid_grey_and_colours_keep_their_ratios() {
 }
 
 #[test]
-fn what_is_masked_stays_and_has_no_influence() {
+fn masked_pixels_keep_their_values_and_have_no_influence() {
     let masked = Plane::from_fn(90, 70, |x, y| x.abs_diff(30) < 9 && y.abs_diff(20) < 9 || x == 89);
     let with = |hidden: u16, masked: &Plane<bool>| {
         let colour = |x: usize, y: usize| if masked[(x, y)] { [hidden; 3] } else { speckle(x, y) };
@@ -139,14 +139,14 @@ fn what_is_masked_stays_and_has_no_influence() {
     assert_well_formed(&zones, &dark);
     assert_eq!(zones, segment(&bright, &Options::default()));
 
-    // Control: without the mask, the same values do matter.
+    // Control: without the mask, the same values change the results.
     let open = Plane::filled(90, 70, false);
     let [dark, bright] = [dark, bright].map(|image| Image { masked: open.clone(), ..image });
     assert_ne!(homomorphic(&dark).pixels[(30, 30)], homomorphic(&bright).pixels[(30, 30)]);
     assert_ne!(segment(&dark, &Options::default()), segment(&bright, &Options::default()));
 }
 
-/// Whether the zones are 0 to the left of `border` and 1 to the right, except for 12 pixels on each side of
+/// Whether the zones are 0 to the left of `border` and 1 to the right, ignoring 12 pixels on each side of
 /// it.
 fn parts_at(zones: &Zones, border: usize) -> bool {
     let (width, height) = zones.map.size();
@@ -237,7 +237,7 @@ fn small_images_have_few_clusters() {
 }
 
 #[test]
-fn images_without_texture_have_zones_of_place() {
+fn images_without_texture_are_split_by_position() {
     for level in [0, 1, 30000, 65535] {
         let image = image(64, 48, |_, _| [level; 3]);
         let zones = segment(&image, &clusters());
@@ -245,14 +245,14 @@ fn images_without_texture_have_zones_of_place() {
         assert_eq!(zones.count, 15);
         assert_eq!(zones, segment(&self::image(64, 48, |_, _| [7; 3]), &clusters()));
     }
-    // Where there is texture, coordinates alone do not decide.
+    // Where there is texture, position alone does not decide.
     let plain = image(64, 48, |_, _| [7; 3]);
     let textured = image(64, 48, speckle);
     assert_ne!(segment(&textured, &Options::default()), segment(&plain, &Options::default()));
 }
 
 #[test]
-fn images_without_light_or_pixels_come_back() {
+fn black_and_empty_images_are_returned_unchanged() {
     let hidden = Image { masked: Plane::filled(40, 30, true), ..image(40, 30, speckle) };
     let zones = segment(&hidden, &Options::default());
     assert_well_formed(&zones, &hidden);
@@ -265,7 +265,7 @@ fn images_without_light_or_pixels_come_back() {
     assert_eq!(homomorphic(&empty), empty);
     assert_eq!(segment(&empty, &Options::default()).count, 0);
 
-    // A single unmasked pixel that no coarse grid meets.
+    // A single unmasked pixel, off every coarse grid.
     let mut almost = Image { masked: Plane::filled(300, 200, true), ..image(300, 200, speckle) };
     almost.masked[(299, 1)] = false;
     let zones = segment(&almost, &Options::default());
@@ -273,8 +273,8 @@ fn images_without_light_or_pixels_come_back() {
     assert_eq!((zones.count, zones.map[(299, 1)]), (1, 0));
 }
 
-/// The connected regions by their definition: regions that touch within a cluster become one, until none do. Regions are numbered
-/// in the order of their first pixels.
+/// Connected regions by definition: regions of a cluster that touch are merged until none do. They are
+/// numbered in the order of their first pixels.
 fn regions(clusters: &Plane<u32>, steps: &[(i32, i32)]) -> Zones {
     let (width, height) = clusters.size();
     let inside = |(x, y): (i32, i32)| x >= 0 && y >= 0 && x < width as i32 && y < height as i32;
@@ -320,13 +320,13 @@ fn regions_are_connected_parts_of_clusters() {
             let clusters = Plane::from_fn(width, height, cluster);
             let found = connected(&clusters);
             assert_eq!(found, regions(&clusters, &beside), "{width} x {height}, {kinds} kinds");
-            // Control: another meaning of connected.
+            // Control: counting diagonal neighbours as connected gives other regions.
             told_apart += u32::from(found != regions(&clusters, &corners_too));
         }
     }
     assert!(told_apart > 5, "{told_apart}");
 
-    // A spiral is one region, and what it winds around is another.
+    // A spiral is one region, and the area that it encloses is another.
     let wall = ["#######", "......#", "#####.#", "#...#.#", "#.###.#", "#.....#", "#######"];
     let spiral = Plane::from_fn(7, 7, |x, y| u32::from(wall[y].as_bytes()[x] == b'#'));
     assert_eq!(connected(&spiral).count, 2);
@@ -347,7 +347,7 @@ fn zones_are_regions_of_clusters() {
 }
 
 #[test]
-fn the_method_says_what_is_corrected_and_what_a_zone_is() {
+fn the_method_sets_the_correction_and_the_extent_of_zones() {
     let folder = Path::new("testdata/exposure");
     let pair = Pair::open(folder.join("im0.png"), folder.join("im1.png")).unwrap();
     let range = DisparityRange::new(0, 31).unwrap();
@@ -374,7 +374,7 @@ fn the_method_says_what_is_corrected_and_what_a_zone_is() {
             seen.push(found.label_ranges);
         }
     }
-    // Control: the sources and extents tell. Without correction the zones are those of `homomorphic`.
+    // Control: sources and extents change the ranges; `None` and `Homomorphic` have the same source.
     assert!(seen[0] == seen[2] && seen[1] == seen[3]);
     assert!(seen[2] != seen[3] && seen[2] != seen[4] && seen[3] != seen[5] && seen[4] != seen[5]);
 }

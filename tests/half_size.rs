@@ -1,4 +1,4 @@
-//! A pair matched at half its size: devices agree on every shape, range and mask, and what holds of the maps at full size.
+//! Pairs matched at half size: devices agree for every shape, range and mask, and the full-size maps keep their invariants.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
@@ -25,7 +25,7 @@ fn scene(name: &str) -> Pair {
     Pair::open(folder(name).join("im0.png"), folder(name).join("im1.png")).unwrap()
 }
 
-/// A part of a rendered scene whose width and height are odd.
+/// A crop of a rendered scene with odd width and height.
 fn odd(name: &str) -> Pair {
     scene(name).crop(&Rect { x: 20..187, y: 30..121 })
 }
@@ -34,7 +34,7 @@ fn matched(pair: &Pair, range: DisparityRange, method: &Method) -> Maps {
     Matcher::builder().device("cpu").build().unwrap().job(pair, range).method(method).run().unwrap().maps
 }
 
-/// `fast`, with the map of the right view.
+/// The preset `fast`, with the map of the right view.
 fn half() -> Method {
     let mut method = Method::fast();
     method.refinement.right_map = true;
@@ -42,7 +42,7 @@ fn half() -> Method {
     method
 }
 
-/// Each of some pairs on a device, one after the other, is what the CPU path makes of it.
+/// Checks that a device matches each pair, twice in sequence, as the CPU path does.
 fn agree<'a>(cases: impl IntoIterator<Item = (&'a str, Pair, DisparityRange, Method)>) {
     let Some(gpu) = devices::open(FaultInjection::default()) else { return };
     let mut matcher = Matcher::on(Ok(gpu), false, &Execution::default()).unwrap();
@@ -93,7 +93,7 @@ fn devices_agree() {
         ("zones", odd("thin"), RANGE, with(|m| m.front.zone_sigmas = 1.0)),
         ("sad", odd("thin"), RANGE, with(|m| m.cost.matching = mrfgs::options::MatchingCost::Sad)),
     ]);
-    // Control: at its own size it is another map.
+    // Control: matching at full size gives a different map.
     let mut full = half();
     full.schedule.match_size = MatchSize::Full;
     assert!(matched(&odd("slanted"), RANGE, &full) != matched(&odd("slanted"), RANGE, &half()));
@@ -109,7 +109,7 @@ fn every_shape_has_maps_of_its_size() {
     }));
 }
 
-/// The right view's map is that of the mirrored pair, where nothing looks at runners-up, which are not known of that view.
+/// The right map equals the map of the mirrored pair if no step reads runners-up, which are unknown for the right view.
 #[test]
 fn the_right_map_is_that_of_the_mirrored_pair() {
     let pair = scene("slanted").crop(&Rect { x: 20..188, y: 30..121 });
@@ -122,7 +122,7 @@ fn the_right_map_is_that_of_the_mirrored_pair() {
     let known = |validity: &u8| validity & !flag::LOW_CONFIDENCE;
     assert_eq!(right.validity.map(known), mirrored.validity.mirrored().map(known));
     assert!(right.disparity == mirrored.disparity.mirrored());
-    // Control: it is not that of the left view.
+    // Control: the left view has a different map.
     assert!(right.disparity != matched(&pair, RANGE, &method).disparity);
 }
 
@@ -153,7 +153,7 @@ fn identical_views_have_no_disparity() {
     assert!(off * 500 < maps.disparity.data().len(), "{off}");
 }
 
-/// Mean error, and the percentage of pixels whose error is above 2 px.
+/// Mean error in px, and the percentage of pixels with an error above 2 px.
 fn errors(name: &str, maps: &Maps) -> [f64; 2] {
     let truth = read::read_disparity(&folder(name).join("disp0GT.pfm")).unwrap();
     let found = maps.final_map();
@@ -163,7 +163,7 @@ fn errors(name: &str, maps: &Maps) -> [f64; 2] {
     [errors.iter().sum::<f64>() / count, 100.0 * errors.iter().filter(|e| **e > 2.0).count() as f64 / count]
 }
 
-/// Thin things, slanted surfaces and steps between them keep what the full size says of them.
+/// Thin objects, slanted surfaces and depth steps survive matching at half size.
 #[test]
 fn scenes_stay_within_their_floors() {
     for (name, most) in
@@ -176,10 +176,10 @@ fn scenes_stay_within_their_floors() {
     }
 }
 
-/// Progress goes from 0 to 1, and tiles change hardly anything.
+/// Progress goes from 0 to 1, and tiling changes few pixels.
 #[test]
 fn progress_and_tiles() {
-    // Eight scenes, one below the other, leave room for tiles.
+    // Eight scenes stacked vertically are large enough for tiles.
     let stacked = |image: &Image| {
         let (width, height) = image.pixels.size();
         let pixels = Plane::from_fn(width, 8 * height, |x, y| image.pixels[(x, y % height)]);
@@ -187,7 +187,7 @@ fn progress_and_tiles() {
     };
     let one = scene("slanted");
     let pair = Pair::new(stacked(one.left()), stacked(one.right())).unwrap();
-    // Of many labels, volumes take more than maps.
+    // With many labels, volumes take more memory than maps.
     let wide = DisparityRange { min: 0, max: 255 };
     let plan = streamed(&Plan::new(pair.size().0, pair.size().1, wide, &half()).unwrap());
     let cpu = || Matcher::builder().device("cpu").build().unwrap();
@@ -218,7 +218,7 @@ fn progress_and_tiles() {
     assert!(off(&right(&whole), &right(&tiled)) * 100 < whole.disparity.data().len());
 }
 
-/// The plan tells the size and the range of the pair, and those that are matched.
+/// A plan states the size and range of the pair as well as those that are matched.
 #[test]
 fn plans_tell_both_sizes() {
     let range = DisparityRange::new(-3, 20).unwrap();
@@ -228,7 +228,7 @@ fn plans_tell_both_sizes() {
     assert_eq!(Tiles::new(&plan).unwrap().count(), 1);
     let full = Plan::new(167, 91, range, &Method::default()).unwrap();
     assert_eq!((full.of_pair().size, full.size()), ((167, 91), (167, 91)));
-    // Control: what the full size takes is counted.
+    // Control: the plan counts the memory of full-size maps and images.
     let alone = Plan { full: None, ..plan.clone() };
     assert!(plan.map_bytes() > alone.map_bytes() && plan.pair_bytes() == 5 * alone.pair_bytes());
 }

@@ -1,5 +1,4 @@
-//! The layers that ARCHITECTURE.md states: no file imports from a higher layer. In no package do imports form
-//! a circle, direct or indirect.
+//! The layers in ARCHITECTURE.md: no file imports from a higher layer, and no package has cyclic imports.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -13,19 +12,19 @@ use syn::{Item, ItemMacro, ItemMod, ItemUse, UseTree, Visibility, parse_quote};
 
 const NONE: [&str; 0] = [];
 
-/// The path of a module, or of what code names: `["backend", "cpu"]`.
+/// The path of a module or an item: `["backend", "cpu"]`.
 type Names = Vec<String>;
-/// Which file imports from which.
+/// Pairs of an importing file and the file that it imports from.
 type Imports = BTreeSet<(Names, Names)>;
 
 /// A package without its unit tests.
 #[derive(Default)]
 struct Package {
-    /// Each module, and the file that it is in.
+    /// Each module, and the file that contains it.
     modules: BTreeMap<Names, Names>,
-    /// What `use` and exported macros add, by its full name: the module that says it, and its path.
+    /// Names defined by `use` and exported macros, by full path: the defining module, and the path meant.
     added: BTreeMap<Names, (Names, Names)>,
-    /// The paths in the code of each module. What is only passed on is no import.
+    /// The paths in the code of each module, except re-exports.
     paths: BTreeSet<(Names, Names)>,
 }
 
@@ -87,7 +86,7 @@ impl Package {
         self.added.extend(name.map(|name| ([module, &[name][..]].concat(), (module.clone(), path))));
     }
 
-    /// Adds what stands between `::`, also in what macros take.
+    /// Adds all paths in `tokens`, also those in macro arguments.
     fn add_paths(&mut self, module: &Names, tokens: TokenStream) {
         let (mut path, mut colons) = (Names::new(), 0);
         for token in tokens {
@@ -109,7 +108,7 @@ impl Package {
         self.paths.insert((module.clone(), path));
     }
 
-    /// The module that defines what `path` means in the module `at`, if it is one of the package.
+    /// The module of the package that defines `path` as seen from the module `at`.
     fn definer(&self, at: &Names, path: &[String]) -> Option<Names> {
         let (mut at, mut inside) = (at.clone(), ["crate", "super", "self"].contains(&path.first()?.as_str()));
         for (i, name) in path.iter().enumerate() {
@@ -118,7 +117,7 @@ impl Package {
                 "crate" => at.clear(),
                 "super" => at.truncate(at.len().checked_sub(1)?),
                 "self" => {}
-                // A name alone is no module: variables may be called like one.
+                // A single name is no module, since a variable may have the same name.
                 _ if path.len() > 1 && self.modules.contains_key(&full) => (at, inside) = (full, true),
                 _ => {
                     let added = self.added.get(&full).filter(|(_, path)| path[0] != *name);
@@ -128,7 +127,7 @@ impl Package {
                 }
             }
         }
-        // That of `pub(crate)` names nothing.
+        // The path of `pub(crate)` names no item.
         Some(at).filter(|_| path.len() > 1)
     }
 
@@ -143,7 +142,7 @@ fn below(module: &[String], name: &Ident) -> Names {
     [module, &[name.unraw().to_string()]].concat()
 }
 
-/// The imports in circles and between circles.
+/// The imports on a cycle or on a path between cycles.
 fn circles(imports: &Imports) -> Vec<String> {
     let mut left = imports.clone();
     loop {
@@ -156,7 +155,7 @@ fn circles(imports: &Imports) -> Vec<String> {
     }
 }
 
-/// The imports from a higher layer. The root is above all.
+/// The imports from a higher layer. The crate root is above all layers.
 fn upward(imports: &Imports, layers: &[Vec<String>]) -> Vec<String> {
     let layer = |module: &Names| {
         let name = module.first()?;
@@ -170,7 +169,7 @@ fn shown((from, to): &(Names, Names)) -> String {
     format!("{} -> {}", from.join("::"), to.join("::"))
 }
 
-/// The layers under a heading of ARCHITECTURE.md, highest first: what stands before two spaces in its lines.
+/// The layers under a heading of ARCHITECTURE.md, highest first: the names before two spaces in each line.
 fn layers(heading: &str) -> Vec<Vec<String>> {
     let section =
         include_str!("../ARCHITECTURE.md").split(&format!("## {heading}\n")).nth(1).expect("the heading");
@@ -195,12 +194,12 @@ fn imports_lead_down() {
     }
 }
 
-/// Controls: what a made-up package with a file for each module breaks is found.
+/// Controls: violations in a made-up package, with one file for each module, are detected.
 #[test]
 fn circles_and_upward_imports_are_found() {
     let layers = [vec!["high".to_owned()], vec!["low".to_owned()]];
     for (text, expected, ups, rounds) in [
-        // By all ways to name something. What is passed on belongs to the file that defines it.
+        // All ways to name an item. A re-exported item belongs to the file that defines it.
         ("mod high { use crate::low::{A, B as C}; } mod low {}", "high -> low", 0, 0),
         ("mod high { fn f(a: &[crate::low::A]) {} } mod low {}", "high -> low", 0, 0),
         ("mod high { fn f() { say!(1, crate::low::a()) } } mod low {}", "high -> low", 0, 0),

@@ -1,5 +1,5 @@
-//! Whole matches: their maps equal those of the naive twins, run in the order in which the stages are
-//! described. Also the properties that hold for every method.
+//! Whole matches: their maps equal those of the naive twins, run in the documented order of the stages. Also
+//! properties that hold for every method.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
@@ -22,7 +22,7 @@ use mrfgs::options::{DisparityRange, Fill, LeftRightCheck, MatchingCost, Median,
 use pollster::block_on;
 use std::ops::ControlFlow;
 
-/// The maps that the naive twins compute from what a match leaves in `finest`.
+/// The maps that the naive twins compute from the results of a match in `finest`.
 fn finished(finest: &mut Finest, plan: &Plan, pair: &Pair) -> Maps {
     finest.disparity = finest.raw.clone();
     twin_maps(finest, plan, pair);
@@ -36,7 +36,7 @@ fn finished(finest: &mut Finest, plan: &Plan, pair: &Pair) -> Maps {
     }
 }
 
-/// The disparities of the right view before post-processing, mirrored, by the twins.
+/// The raw disparities of the right view, mirrored, as the twins compute them.
 fn right_raw(finest: &Finest, plan: &Plan, pair: &Pair) -> Finest {
     let mut right = finest.clone();
     twin::swap_views::swap_views(&mut right);
@@ -44,14 +44,14 @@ fn right_raw(finest: &Finest, plan: &Plan, pair: &Pair) -> Finest {
     right
 }
 
-/// The map of the right view that the twins make of its mirrored disparities.
+/// The map of the right view that the twins compute from its mirrored disparities.
 fn right_map(right: &mut Finest, plan: &Plan, pair: &Pair) -> RightMap {
     let maps = finished(right, plan, &mirrored(pair));
     let validity = maps.validity.map(|validity| validity & !flag::LOW_CONFIDENCE);
     RightMap { disparity: maps.disparity.mirrored(), validity: validity.mirrored() }
 }
 
-/// The maps of the twins from the estimate on, in the order in which the stages are described.
+/// Runs the twins of all stages after the estimate, in the documented order.
 fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     twin::left_right_check::left_right_check(plan, pair, maps);
     if plan.method.refinement.speckle_size > 0 {
@@ -71,7 +71,7 @@ fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     twin::far_plane::far_plane(plan, pair, maps);
 }
 
-/// Where the maps of two matches differ.
+/// The first difference between the maps of two matches.
 fn compare_all(actual: &Maps, expected: &Maps) -> Result<(), String> {
     compare_maps("raw", &actual.raw, &expected.raw)?;
     compare_maps("validity", &actual.validity, &expected.validity)?;
@@ -144,12 +144,12 @@ fn the_stages_run_in_order() {
     assert!(rights > 10, "{rights} maps of the right view");
 }
 
-/// By a second matching and without the speckle filter, the map of the right view is the map of the mirrored pair, bit for bit.
+/// With a second match and no speckle filter, the right map equals the map of the mirrored pair, bit for bit.
 #[test]
 fn the_right_map_is_the_map_of_the_mirrored_pair() {
     let mut method = Method::default();
     method.refinement.left_right_check = LeftRightCheck::SecondMatch;
-    // The speckle filter gives up ties, and votes ask for confidence: that of the right view is not known.
+    // The speckle filter discards ties, and votes need confidence, which is unknown for the right view.
     (method.refinement.right_map, method.refinement.speckle_size) = (true, 0);
     method.refinement.fill = Fill::Row;
     method.front = random::as_it_is();
@@ -160,16 +160,15 @@ fn the_right_map_is_the_map_of_the_mirrored_pair() {
         for ((name, a), (_, b)) in solve(&pair, &plan).into_iter().zip(solve(&mirrored(&pair), &plan)) {
             let right = a.maps.right.unwrap();
             assert!(right.disparity == b.maps.disparity.mirrored(), "{name}");
-            // Control: it is not that of the left view.
+            // Control: the left view has a different map.
             assert!(right.disparity != a.maps.disparity, "{name}");
         }
     }
 }
 
-/// A tiled match is a match of each crop, of which the core is kept, followed by the remaining stages on all
-/// cores together.
+/// Tiled matching matches each crop, keeps its core, and runs the remaining stages on all cores together.
 #[test]
-fn tiles_are_matched_by_themselves_and_finished_together() {
+fn tiles_are_matched_alone_and_finished_together() {
     let (mut tiled, mut twice, mut other) = (0, 0, 0);
     for seed in 0..40 {
         let mut random = Random::new(seed);
@@ -186,7 +185,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
         let mut finest = Finest::zero((width, height));
         finest.right_label = Plane::filled(width, height, NO_LABEL.into());
         finest.right_best = Plane::filled(width, height, 65_535);
-        // Disparities of the right view, mirrored.
+        // The mirrored disparities of the right view.
         let mut rights = Plane::filled(width, height, 0);
         let mut iterations = 0;
         for tile in tiles.list() {
@@ -252,7 +251,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
         }
         tiled += 1;
         twice += usize::from(method.refinement.left_right_check == LeftRightCheck::SecondMatch);
-        // Control: a match in one piece gives different maps.
+        // Control: matching in one piece gives different maps.
         other += usize::from(matched_whole(&pair, &plan) != expected);
     }
     assert!(
@@ -289,7 +288,7 @@ fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
     iterations
 }
 
-/// Labels of the right view from a separate match: right x is left width - 1 - x of the mirrored pair.
+/// The labels of the right view from a separate match: right x is left width - 1 - x of the mirrored pair.
 fn second_match(pair: &Pair, plan: &Plan) -> Plane<i32> {
     let mirrored = mirrored(pair);
     let mut method = plan.method.clone();
@@ -300,7 +299,7 @@ fn second_match(pair: &Pair, plan: &Plan) -> Plane<i32> {
     Plane::from_fn(width, height, |x, y| raw[(width - 1 - x, y)] / 256 - plan.range.min)
 }
 
-/// The pair with both views exchanged and mirrored.
+/// The mirrored pair: both views mirrored and exchanged.
 fn mirrored(pair: &Pair) -> Pair {
     let mirror = |image: &Image| {
         let (width, height) = image.pixels.size();
@@ -340,10 +339,10 @@ fn identical_views_have_no_disparity() {
     }
 }
 
-/// When the right view moves by a whole pixel of the coarsest level, and the range with it, every level sees
-/// the same costs at other labels, except near borders. A border reaches as far as: the window of the cost;
-/// the pyramid; in each iteration two radii of the graph at the coarsest level, and its resolution factors;
-/// the right view; the median.
+/// Moving the right view and the range by one pixel of the coarsest level gives every level the same costs at
+/// other labels, except near borders. The affected margin is the sum of the cost window, the pyramid, in each
+/// iteration two graph radii at the coarsest level and its resolution factors, the right view, and the
+/// median.
 #[test]
 fn a_shift_of_view_and_range_changes_nothing_inside() {
     let (width, height, levels, labels) = (420, 9, 3u32, 8);
@@ -355,7 +354,7 @@ fn a_shift_of_view_and_range_changes_nothing_inside() {
     ] {
         let mut random = Random::new(31);
         let left = texture(&mut random, width, height);
-        // Moved by 0 to 7, changing along the row, with some noise: neither certain nor hopeless.
+        // Moved by 0 to 7 px, varying along the row, with noise: labels are neither certain nor arbitrary.
         let moved = Plane::from_fn(width, height, |x, y| {
             let d = (x / 23 + y / 3) % labels;
             let [r, g, b, _] = left.pixels[((x + d).min(width - 1), y)];
@@ -372,7 +371,7 @@ fn a_shift_of_view_and_range_changes_nothing_inside() {
         if cost == MatchingCost::Sad {
             (method.cost.outside_cost, method.messages.temperature) = (20.0, 8.0);
         }
-        // The speckle filter and the fill may reach any distance.
+        // The speckle filter and the fill act over any distance, so they are off.
         (method.refinement.speckle_size, method.refinement.fill, method.refinement.median_window) =
             (0, Fill::None, 5);
         let iterations = 3;
@@ -404,7 +403,7 @@ fn a_shift_of_view_and_range_changes_nothing_inside() {
                 }
             }
             assert!(inside >= 500, "{inside} pixels inside");
-            // Control: borders do matter where they may, and the interior is not uniform.
+            // Control: the margin does change, and the interior is not uniform.
             assert!(
                 elsewhere > 0 && distinct.iter().filter(|&&d| d).count() > 5,
                 "{elsewhere}, {distinct:?}"
@@ -428,7 +427,7 @@ fn the_number_of_threads_changes_no_bit() {
     }
 }
 
-/// The same image with other values where it is masked.
+/// A copy of the image with other values where it is masked.
 fn poisoned(random: &mut Random, image: &Image) -> Image {
     let mut pixels = image.pixels.clone();
     for (pixel, &masked) in pixels.data_mut().iter_mut().zip(image.masked.data()) {
@@ -443,7 +442,7 @@ fn poisoned(random: &mut Random, image: &Image) -> Image {
 }
 
 #[test]
-fn masked_values_are_never_looked_at() {
+fn masked_values_have_no_influence() {
     let mut masked_pixels = 0;
     for seed in 0..40 {
         let mut random = Random::new(seed);
@@ -464,9 +463,9 @@ fn masked_values_are_never_looked_at() {
     assert!(masked_pixels > 1000);
 }
 
-/// Negative control: values that are not masked do matter.
+/// Negative control: unmasked values do have influence.
 #[test]
-fn control_values_that_are_not_masked_are_looked_at() {
+fn control_unmasked_values_have_influence() {
     let mut random = Random::new(2);
     let plan = random::plan((29, 18), 0, 13, &Method::default());
     let pair = Pair::new(texture(&mut random, 29, 18), texture(&mut random, 29, 18)).unwrap();
@@ -506,10 +505,10 @@ fn masks_and_single_pixels_pass_through() {
     }
 }
 
-/// Negative control for the right view: where nothing projects there is no label, and this does not count as
+/// Negative control for the right view: a pixel to which nothing projects has no label, and that is not
 /// agreement.
 #[test]
-fn no_label_agrees_with_none() {
+fn no_label_is_no_agreement() {
     let mut random = Random::new(1);
     let plan = random::plan((5, 1), 0, 4, &Method::default());
     let pair = Pair::new(texture(&mut random, 5, 1), texture(&mut random, 5, 1)).unwrap();

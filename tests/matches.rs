@@ -1,5 +1,5 @@
-//! Sparse matches and the results derived from them: always on rendered scenes, and on real pairs where
-//! `MRFGS_MIDDLEBURY` names their folder.
+//! Sparse matches and their use: always on rendered scenes, and on real pairs where `MRFGS_MIDDLEBURY` names
+//! their folder.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -7,7 +7,7 @@ use mrfgs::error::{Error, RangeError};
 use mrfgs::image::{Image, Pair, Plane, Rect, calib::Calibration, pfm, read};
 use mrfgs::low_level::front::check::{self, Warning};
 use mrfgs::low_level::front::label_range::{self, LabelRanges, MIN_MATCHES};
-use mrfgs::low_level::front::matches::{self, Match};
+use mrfgs::low_level::front::matches::{self, SparseMatch};
 use mrfgs::maps::FRACTION;
 use mrfgs::options::DisparityRange;
 use std::io::Write;
@@ -43,9 +43,9 @@ impl Case {
         Self::load(&Path::new("testdata").join(name))
     }
 
-    /// Pixels per match, and the percentage of matches that are wrong by more than 1.5 px, among those that
-    /// both views see.
-    fn accuracy(&self, found: &[Match]) -> (usize, f64) {
+    /// The number of pixels per match, and the percentage of matches more than 1.5 px off among the
+    /// pixels that both views see.
+    fn accuracy(&self, found: &[SparseMatch]) -> (usize, f64) {
         let errors: Vec<f32> = found
             .iter()
             .filter(|m| self.visible[(m.x, m.y)] == 255)
@@ -55,13 +55,13 @@ impl Case {
         (self.truth.data().len() / found.len().max(1), 100.0 * bad as f64 / errors.len() as f64)
     }
 
-    /// Known true disparities.
+    /// The true disparities that are known.
     fn truths(&self) -> impl Iterator<Item = f32> {
         self.truth.data().iter().copied().filter(|t| t.is_finite())
     }
 }
 
-/// The five real pairs, if there are any.
+/// The five real pairs, if available.
 fn real_pairs() -> Vec<Case> {
     let Some(folder) = std::env::var_os("MRFGS_MIDDLEBURY").map(PathBuf::from) else {
         let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
@@ -84,7 +84,7 @@ fn crude_zones(image: &Image) -> Plane<u32> {
 
 #[test]
 fn matches_of_rendered_scenes_are_right() {
-    // Largest number of pixels per match, and largest percentage of matches wrong by more than 1.5 px.
+    // The limits: pixels per match, and the percentage of matches more than 1.5 px off.
     let floors = [
         ("slanted", 90, 1.5),
         ("thin", 120, 4.0),
@@ -118,7 +118,7 @@ fn matches_of_real_pairs_are_right() {
 fn disparities_lie_between_the_pixels() {
     let case = Case::scene("slanted");
     let found = matches::find(&case.pair, None, Some(case.range));
-    let mean = |disparity: fn(&Match) -> i32| {
+    let mean = |disparity: fn(&SparseMatch) -> i32| {
         let errors = found.iter().map(|m| {
             let error = disparity(m) as f32 / FRACTION as f32 - case.truth[(m.x, m.y)];
             error.abs().min(1.5)
@@ -128,7 +128,7 @@ fn disparities_lie_between_the_pixels() {
     let whole = mean(|m| (m.disparity + FRACTION / 2).div_euclid(FRACTION) * FRACTION);
     let (exact, mirrored) = (
         mean(|m| m.disparity),
-        // Control: the fraction with the wrong sign.
+        // Control: a fraction of the wrong sign.
         mean(|m| 2 * ((m.disparity + FRACTION / 2).div_euclid(FRACTION) * FRACTION) - m.disparity),
     );
     assert!(
@@ -149,7 +149,7 @@ fn the_score_is_the_correlation_of_the_windows() {
     let found = matches::find(&case.pair, None, Some(case.range));
     assert!(found.len() > 100);
     for m in found {
-        // The window is at whole pixels, within half a pixel of the match.
+        // The window is at whole pixels, so at most half a pixel from the match.
         let d = (m.disparity + FRACTION / 2).div_euclid(FRACTION);
         let left = window(case.pair.left(), m.x, m.y);
         let right = window(case.pair.right(), (m.x as i32 - d) as usize, m.y);
@@ -216,7 +216,7 @@ fn masked_pixels_are_never_used() {
     let clean = found(0);
     assert_eq!(clean, found(0xffff));
     assert!(clean.len() > 200);
-    let near = |m: &Match| (57..103).contains(&m.x) && (47..113).contains(&m.y);
+    let near = |m: &SparseMatch| (57..103).contains(&m.x) && (47..113).contains(&m.y);
     assert!(!clean.iter().any(near));
     assert!(matches::find(&case.pair, None, Some(case.range)).iter().any(near));
 }
@@ -235,7 +235,7 @@ fn pixels_of_no_zone_give_no_match() {
 }
 
 #[test]
-fn there_is_nothing_to_match() {
+fn pairs_without_texture_have_no_match() {
     let noise = |width, height| {
         Image::from_rgb8(&Plane::from_fn(width, height, |x, y| {
             let v = (x * x * 31 + y * y * 17 + x * y * 13) as u8;
@@ -261,31 +261,31 @@ fn there_is_nothing_to_match() {
     // Control: the noise itself can be matched.
     let pair = Pair::new(noise(60, 50), noise(60, 50)).unwrap();
     assert!(!matches::find(&pair, None, None).is_empty());
-    // Views of different scenes cannot.
+    // Views of different scenes cannot be matched.
     let (left, right) = (Case::scene("slanted"), Case::scene("thin"));
     let strangers = Pair::new(left.pair.left().clone(), right.pair.right().clone()).unwrap();
     not_found(&strangers);
 }
 
-/// That matches find no range.
+/// Checks that sparse matches give no range.
 fn not_found(pair: &Pair) {
     let found = check::range(pair);
     assert!(matches!(found, Err(Error::Range(RangeError::NotFound { .. }))), "{found:?}");
 }
 
 /// Matches at (0, 0), (1, 0) and so on.
-fn matches_of(disparities: &[i32]) -> Vec<Match> {
-    let at = |(x, &disparity): (usize, &i32)| Match { x, y: 0, disparity, dy: 0, score: 1.0 };
+fn matches_of(disparities: &[i32]) -> Vec<SparseMatch> {
+    let at = |(x, &disparity): (usize, &i32)| SparseMatch { x, y: 0, disparity, dy: 0, score: 1.0 };
     disparities.iter().enumerate().map(at).collect()
 }
 
 #[test]
-fn supports_are_mu_and_k_sigma() {
+fn supports_are_mu_plus_minus_k_sigma() {
     let range = DisparityRange::new(-4, 20).unwrap();
     // Ten matches of mean 5.5 px and sigma 1.5 px in zone 0, none in zone 1, and one pixel without a zone.
     let found = matches_of(&[4, 7, 4, 7, 4, 7, 4, 7, 4, 7].map(|d| d * FRACTION));
     let zones = Plane::new(12, 1, vec![0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 7]);
-    let interval = |k: f64, found: &[Match]| -> (i32, i32) {
+    let interval = |k: f64, found: &[SparseMatch]| -> (i32, i32) {
         let label_range = label_range::zonal(range, (&zones, 2), found, k);
         for x in [10, 11] {
             assert_eq!(label_range[(x, 0)], [-4, 20]);
@@ -298,12 +298,12 @@ fn supports_are_mu_and_k_sigma() {
     assert_eq!(interval(5.0, &found), (-2, 13));
     assert_eq!(interval(100.0, &found), (-4, 20));
     assert_eq!(interval(1.0, &found[..MIN_MATCHES - 1]), (-4, 20));
-    // The interval does not meet the range.
+    // An interval outside the range.
     assert_eq!(interval(1.0, &matches_of(&[100 * FRACTION; 10])), (-4, 20));
 }
 
 #[test]
-fn a_coarse_support_is_the_hull_of_its_childrens() {
+fn a_coarse_support_is_the_hull_of_its_children() {
     let bits = |x: usize, y: usize| (x * 2_654_435_761 + y * 40_503 + x * y * 7_919) >> 7;
     for (width, height) in [(1, 1), (2, 2), (7, 5), (8, 3), (1, 6)] {
         let fine: LabelRanges = Plane::from_fn(width, height, |x, y| {
@@ -328,7 +328,7 @@ fn a_coarse_support_is_the_hull_of_its_childrens() {
     }
 }
 
-/// Percentage of the true disparities inside the label range, and of the labels that remain.
+/// The percentage of true disparities inside the label ranges, and the percentage of labels kept.
 fn supported(case: &Case, k: f64) -> (f64, f64) {
     let zones = crude_zones(case.pair.left());
     let found = matches::find(&case.pair, Some((&zones, 15)), Some(case.range));
@@ -372,14 +372,14 @@ fn the_range_holds_the_truth() {
     }
 }
 
-/// Cameras that look in the same direction see nothing below 0.
+/// Parallel cameras see no disparity below 0.
 #[test]
 fn only_converging_cameras_are_searched_below_0() {
     for case in SCENES.map(Case::scene) {
         let (width, height) = case.pair.size();
         let mut truths: Vec<f32> = case.truths().collect();
         truths.sort_by(f32::total_cmp);
-        // All disparities become smaller by `less`.
+        // Crops the views so that all disparities become smaller by `less`.
         let range = |less: usize| {
             let part = |image: &Image, x| image.crop(&Rect { x, y: 0..height });
             let (left, right) =
@@ -395,8 +395,8 @@ fn only_converging_cameras_are_searched_below_0() {
 }
 
 #[test]
-fn known_cameras_see_nothing_behind_them() {
-    // Two surfaces; the lower one would be behind parallel cameras.
+fn known_cameras_see_no_point_behind_them() {
+    // Two surfaces; parallel cameras would have the lower one behind them.
     let noise = |x: i32, y: i32| {
         let hash = ((x + 1000) as u32 * 73 + y as u32 * 179 + 1).wrapping_mul(0x9e37_79b9);
         [(hash >> 24) as u8; 3]
@@ -412,7 +412,7 @@ fn known_cameras_see_nothing_behind_them() {
     assert!(all.min < -9 && all.max > 12, "{all:?}");
     let cut = check::range_of_cameras(&pair, 0.0).unwrap();
     assert!(cut.min == 0 && cut.max > 12 && cut.max < all.max, "{cut:?}");
-    // Of these cameras nothing is behind, and of those nearly all is: then they are not those of the pair.
+    // The cameras have nothing behind them, or nearly everything; then they are not the cameras of the pair.
     for doffs in [40.0, -40.0] {
         assert_eq!(check::range_of_cameras(&pair, doffs).unwrap(), all, "{doffs}");
     }

@@ -1,5 +1,5 @@
-//! Whole matches: every output of the GPU path equals that of the CPU path, bit for bit. On rendered scenes
-//! and, where `MRFGS_MIDDLEBURY` names their folder, on real pairs; also on a device with small bindings.
+//! Whole matches: every output of the GPU path equals the CPU path's, bit for bit. On rendered scenes,
+//! on real pairs where `MRFGS_MIDDLEBURY` names their folder, and on a device with small bindings.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -33,7 +33,7 @@ fn matched(backend: &mut dyn Backend, pair: &Pair, range: DisparityRange, method
     common::solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
-/// The outputs in which two matches differ.
+/// The names of the outputs in which two matches differ.
 fn differences(a: &Solution, b: &Solution) -> Vec<&'static str> {
     let mut all = Vec::new();
     let mut add = |name, differs| {
@@ -49,13 +49,13 @@ fn differences(a: &Solution, b: &Solution) -> Vec<&'static str> {
     all
 }
 
-/// Presets whose matches are at the pair's own size alone. At twice the size a match needs more of a device.
+/// The presets that match at most at the pair's own size; twice the size needs more of a device.
 fn presets_at_one_size() -> impl Iterator<Item = &'static str> {
     let all = PRESETS.iter().filter(|preset| preset.method().schedule.match_size != MatchSize::Double);
     all.map(|preset| preset.name)
 }
 
-/// The part of an image in these columns and rows.
+/// The upper left part of an image, of this size.
 fn cut(image: &Image, width: usize, height: usize) -> Image {
     Image {
         pixels: Plane::from_fn(width, height, |x, y| image.pixels[(x, y)]),
@@ -63,12 +63,12 @@ fn cut(image: &Image, width: usize, height: usize) -> Image {
     }
 }
 
-/// Whether everything is compared, which takes long: `MRFGS_PARITY` is `all`.
+/// Whether to compare every scene by every preset, which takes long: `MRFGS_PARITY` is `all`.
 fn everything() -> bool {
     std::env::var("MRFGS_PARITY").is_ok_and(|v| v == "all")
 }
 
-/// One scene by every preset, and the others by the default alone, or by every preset with [`everything`].
+/// Compares one scene by every preset, and the others by the default preset unless [`everything`] is set.
 #[test]
 fn presets_on_rendered_scenes() {
     let Some(mut gpu) = devices::gpu() else { return };
@@ -89,8 +89,8 @@ fn presets_on_rendered_scenes() {
 }
 
 #[test]
-fn one_option_less_shows() {
-    // Control: a method that differs in its last digit gives different maps.
+fn a_changed_option_is_noticed() {
+    // Control: a slightly different method gives different maps.
     let (pair, range) = load(Path::new("testdata/slanted"));
     let method = Method::default();
     let mut other = method.clone();
@@ -130,12 +130,12 @@ fn small_devices() {
             minimum(),
             // Bands of one or two rows.
             binding(700_000),
-            // Parts of a few rows.
+            // Pieces of a few rows.
             buffer(2 << 20),
             // Dispatches that wrap around.
             FaultInjection { max_groups: Some(150), ..FaultInjection::default() },
         ];
-        // The first case has all limits at once; the others show which of them was the cause.
+        // The first case sets all limits at once; the others show which limit fails.
         let tried = if preset == "default" { handicaps.len() } else { 1 };
         for faults in handicaps.into_iter().take(tried) {
             let Some(mut gpu) = devices::open(faults) else { return };
@@ -149,14 +149,14 @@ fn small_devices() {
     }
 }
 
-/// All buffers are filled with garbage first: everything that is read was written before.
+/// All buffers are filled with garbage first, so nothing is read before it is written.
 #[test]
 fn poisoned_buffers() {
     for preset in presets_at_one_size() {
         let mut method = Method::preset(preset).unwrap();
         method.schedule.tolerance = 0.5;
         let (pair, range) = load(Path::new("testdata/thin"));
-        // Which buffers there are does not depend on the size.
+        // The set of buffers does not depend on the size.
         let pair = Pair::new(cut(pair.left(), 240, 90), cut(pair.right(), 240, 90)).unwrap();
         let expected = matched(&mut Cpu::default(), &pair, range, &method);
         let mut backends: Vec<Box<dyn Backend>> = vec![Box::new(Cpu::default())];
@@ -176,14 +176,14 @@ fn poisoned_buffers() {
                     differences(&actual, &expected)
                 );
             }
-            // Control: the garbage does reach the buffers of the results.
+            // Control: the garbage reaches the result buffers.
             backend.probe().poison(0x5a).unwrap();
             assert!(differences(&matched_maps_only(backend.as_mut()), &expected).contains(&"disparity"));
         }
     }
 }
 
-/// The maps that the backend holds.
+/// The maps that the backend holds at the moment.
 fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
     let requested = backend.request_maps().unwrap();
     let (maps, traffic, cells) =
@@ -199,24 +199,24 @@ fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
     }
 }
 
-/// The pair is uploaded once, the maps are read back once, and nothing is transferred in between.
+/// The pair is uploaded once and the maps are read back once, without any other transfer.
 #[test]
-fn nothing_leaves_the_device_in_between() {
+fn nothing_else_is_transferred() {
     let Some(mut gpu) = devices::open(FaultInjection::default()) else { return };
     let (pair, range) = load(Path::new("testdata/slanted"));
     let method = Method::default();
     matched(&mut gpu, &pair, range, &method);
     let traffic = gpu.traffic();
-    // Disparity, raw disparity and flags of 240 x 180 pixels, rows of 256.
+    // Disparity, raw disparity and flags of 240 x 180 pixels, in rows of 256.
     assert_eq!(traffic.bytes_down, 3 * 4 * 256 * 180, "{traffic:?}");
-    // With a tolerance, a few words say when it was reached.
+    // With a tolerance, a few more words are read back to tell when it was reached.
     let mut tolerant = method.clone();
     (tolerant.schedule.tolerance, tolerant.schedule.final_iterations) = (0.5, 20);
     let iterations = matched(&mut gpu, &pair, range, &tolerant).iterations;
     assert!(gpu.traffic().bytes_down - traffic.bytes_down < 64);
     assert_eq!(iterations, matched(&mut Cpu::default(), &pair, range, &tolerant).iterations);
     assert!(iterations < 3 * 5 + 20, "{iterations}");
-    // A second pair of the same plan takes the same dispatches, and no new parameters.
+    // A second pair of the same plan takes the same dispatches and uploads no parameters.
     matched(&mut gpu, &pair, range, &method);
     matched(&mut gpu, &pair, range, &method);
     assert_eq!(gpu.traffic().dispatches, traffic.dispatches);
@@ -224,7 +224,7 @@ fn nothing_leaves_the_device_in_between() {
 }
 
 #[test]
-fn a_device_that_shows_too_little_says_so() {
+fn a_device_with_too_small_bindings_is_an_error() {
     let Some(mut gpu) =
         devices::open(FaultInjection { max_binding: Some(100_000), ..FaultInjection::default() })
     else {
@@ -235,7 +235,7 @@ fn a_device_that_shows_too_little_says_so() {
     let plan = Plan::new(width, height, range, &Method::default()).unwrap();
     let result = common::solve(&mut gpu, &plan, &pair, &mut |_| ControlFlow::Continue(()));
     assert!(matches!(&result, Err(Error::Memory(MemoryError::Buffer { .. }))), "{result:?}");
-    // The device still serves what fits.
+    // The device still matches smaller pairs.
     let small = Pair::new(cut(pair.left(), 20, 15), cut(pair.right(), 20, 15)).unwrap();
     let range = DisparityRange::new(0, 15).unwrap();
     let method = Method::default();
@@ -274,7 +274,7 @@ fn the_largest_label_counts() {
 }
 
 #[test]
-fn a_device_is_used_for_pair_after_pair() {
+fn a_device_matches_pairs_of_different_plans() {
     let Some(mut gpu) = devices::gpu() else { return };
     let (pair, range) = load(Path::new("testdata/thin"));
     let method = Method::default();
@@ -284,7 +284,7 @@ fn a_device_is_used_for_pair_after_pair() {
     assert!(differences(&first, &matched(&mut gpu, &pair, range, &method)).is_empty());
 }
 
-/// Folders with a pair in `MRFGS_MIDDLEBURY`; none, reported on stderr, where it is not set.
+/// The folders in `MRFGS_MIDDLEBURY` that hold a pair. If it is not set, none, with a note on stderr.
 fn real_pairs() -> Vec<PathBuf> {
     let Ok(folder) = std::env::var("MRFGS_MIDDLEBURY") else {
         let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
@@ -314,8 +314,8 @@ fn volumes_of_a_real_pair() {
     assert!(costs[0] == costs[1]);
 }
 
-/// Real pairs, with all limits of the device, and the first also with the least that WebGPU promises. Only by the default preset;
-/// with [`everything`], all of them with both and by every preset.
+/// Real pairs by the default preset with the limits of the device, and the first one also with the WebGPU
+/// minimum. With [`everything`], all pairs with both limits and by every preset.
 #[test]
 fn maps_of_real_pairs() {
     for (index, folder) in real_pairs().into_iter().enumerate() {

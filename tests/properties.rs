@@ -1,9 +1,8 @@
-//! Properties of every match, for any images, range and method: no panic, the same bits on every backend, and
-//! maps that satisfy their documented invariants.
+//! Properties of every match, for all images, ranges and methods: no panic, the same bits on every backend,
+//! and maps that satisfy their documented invariants.
 //!
-//! Every run draws new cases. A failing case is made as small as possible and printed completely, seeds
-//! included. No file of regressions is kept; each one becomes a test of its own. `PROPTEST_CASES` sets the
-//! number of cases.
+//! Every run draws new cases. A failing case is shrunk and printed with its seeds. There is no file of
+//! regressions: each one becomes a test of its own. `PROPTEST_CASES` sets the number of cases.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -27,18 +26,17 @@ use std::ops::ControlFlow;
 /// The contents of the images.
 #[derive(Clone, Copy, Debug)]
 enum Content {
-    /// Noise, few values or one value, related or not, with masks that cover nothing, something or
-    /// everything.
+    /// Noise, few values or a single value, related or not, with masks over nothing, a part or everything.
     Random,
-    /// Both views the same.
+    /// Identical views.
     Identical,
-    /// Every pixel of both views the same.
+    /// Views of one colour.
     Plain,
-    /// All pixels of the left view masked.
+    /// A left view with all pixels masked.
     Masked,
 }
 
-/// Everything that determines a match, small where it is simple.
+/// All parameters of a match, small for simple cases.
 #[derive(Clone, Debug)]
 struct Case {
     size: (usize, usize),
@@ -47,10 +45,9 @@ struct Case {
     content: Content,
     seed: u64,
     neighbours: usize,
-    /// Corrected illumination, and zones that limit the labels.
+    /// Illumination correction, and zones that limit the labels.
     front: bool,
-    /// In tiles with a memory of 1 MiB and without an overlap; with one, no tile would be smaller than such
-    /// an image.
+    /// Tiles in 1 MiB of memory, without overlap; with overlap, no tile would be smaller than these images.
     tiled: bool,
 }
 
@@ -67,7 +64,7 @@ fn cases() -> impl Strategy<Value = Case> {
         |(size, min, labels, content, (seed, neighbours, front, tiled))| Case {
             size,
             min,
-            // More than fit in the memory of tiled matches.
+            // More labels than fit into the memory of tiled matches.
             labels: if tiled { labels + 60 } else { labels },
             content,
             seed,
@@ -115,7 +112,7 @@ impl Case {
     }
 }
 
-/// The tiles of a match; an error where no tile is small enough.
+/// The tiles of a match, or an error where no tile fits.
 fn tiles(case: &Case) -> mrfgs::Result<Tiles> {
     let (width, height) = case.size;
     let plan = Plan::new(width, height, case.range(), &case.method())?;
@@ -132,7 +129,7 @@ fn maps_on(backend: &mut dyn Backend, case: &Case, tiles: &Tiles) -> mrfgs::Resu
     Ok(solution.maps)
 }
 
-/// The first documented invariant that the maps violate.
+/// The first violation of a documented invariant of the maps.
 fn broken(maps: &Maps, pair: &Pair, range: DisparityRange) -> Option<String> {
     let sizes = [maps.disparity.size(), maps.raw.size(), maps.confidence.size(), maps.validity.size()];
     if sizes != [pair.size(); 4] {
@@ -167,7 +164,7 @@ fn number_of_cases() -> u32 {
 }
 
 #[test]
-fn every_match_keeps_its_promises_on_every_backend() {
+fn every_match_satisfies_its_invariants_on_every_backend() {
     let config = Config { cases: number_of_cases(), failure_persistence: None, ..Config::default() };
     let matcher = RefCell::new(Matcher::builder().device("cpu").threads(2).build().unwrap());
     let gpu = RefCell::new(devices::gpu());
@@ -205,9 +202,9 @@ fn every_match_keeps_its_promises_on_every_backend() {
     assert!(whole + tiled > refused, "most cases must be matches");
 }
 
-/// Control: every invariant can be violated, and a violation is detected.
+/// Control: every invariant can be violated, and each violation is detected.
 #[test]
-fn broken_promises_are_noticed() {
+fn violated_invariants_are_noticed() {
     let case = Case {
         size: (9, 7),
         min: -2,
@@ -250,9 +247,9 @@ fn broken_promises_are_noticed() {
     noticed("sizes", |maps| maps.confidence = Plane::filled(9, 6, 0));
 }
 
-/// Control: a different method gives different maps, so equal maps are meaningful.
+/// Control: a different method gives different maps, so equality is meaningful.
 #[test]
-fn another_method_leaves_other_maps() {
+fn another_method_gives_other_maps() {
     let mut differ = 0;
     for seed in 0..8 {
         let case = |seed| Case {

@@ -1,4 +1,4 @@
-//! Rectification of made-up rigs: raw pairs of a rendered scene, seen through known lenses, rectified and matched.
+//! Rectification of synthetic rigs: raw pairs of a rendered scene through known lenses are rectified and matched.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -17,7 +17,7 @@ use mrfgs::rectification::{Doubt, Options, Rectification};
 use mrfgs::{Error, Matcher};
 use raw::{CAMERAS, Camera, Lens, Matrix, SIZE};
 
-/// A quarter turn: the left eye is above the right one in such a camera, and below it.
+/// Quarter turns: with the first the left eye is above the right one, with the second below it.
 const QUARTERS: [Matrix; 2] = [
     [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
     [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
@@ -35,7 +35,7 @@ fn photographs(cameras: &[Camera; 2], size: (usize, usize), scene: &scenes::Scen
     Pair::new(left, right).unwrap()
 }
 
-/// Average error of a match, over the pixels of the left view that `truth` knows.
+/// The mean error of a match in px, over the pixels of the left view with a known `truth`.
 fn error(pair: &Pair, truth: impl Fn(usize, usize) -> Option<f64>) -> f64 {
     let mut matcher = Matcher::builder().device("cpu").build().unwrap();
     let found = matcher.run(pair, DisparityRange::new(0, 40).unwrap()).unwrap().disparity();
@@ -49,7 +49,7 @@ fn error(pair: &Pair, truth: impl Fn(usize, usize) -> Option<f64>) -> f64 {
     errors.iter().sum::<f64>() / errors.len() as f64
 }
 
-/// The true disparity of a rectified pixel: its point in the scene, seen along the axis of the rectified view.
+/// The true disparity at a pixel of the rectified left view.
 fn truth(by: &Rectification, left: &Camera, scene: &scenes::Scene, x: usize, y: usize) -> Option<f64> {
     let calibration = by.calibration().unwrap();
     let (camera, baseline) = (calibration.camera.unwrap(), calibration.baseline.unwrap());
@@ -70,7 +70,7 @@ fn truth(by: &Rectification, left: &Camera, scene: &scenes::Scene, x: usize, y: 
     Some(baseline * fx / raw::turned(&from_scene, point)[2])
 }
 
-/// Rigs with their names and the sizes of their images.
+/// Rigs, with their names and image sizes.
 fn rigs() -> [(&'static str, [Camera; 2], (usize, usize)); 4] {
     let fisheye = |camera: Camera, k1: f64| Camera {
         focal: camera.focal - 6.0,
@@ -111,7 +111,7 @@ fn a_rectified_pair_is_matched_as_well_as_a_perfect_one() {
         println!("{name}: {found:.3} px, perfect pair {reference:.3} px");
         assert!(found <= reference + 0.1, "{name}: {found} against {reference}");
 
-        // Control: as the cameras took them, or rectified by another lens, they are matched far worse.
+        // Control: unrectified, or rectified with the wrong lens, they are matched far worse.
         if name == "pinholes" {
             let crooked = error(&raw, |x, y| truth(&by, &cameras[0], &scene, x, y));
             assert!(crooked > reference + 0.5, "{crooked}");
@@ -124,9 +124,9 @@ fn a_rectified_pair_is_matched_as_well_as_a_perfect_one() {
     }
 }
 
-/// A point in the frame of the original camera is seen through its lens at the pixel that it comes from.
+/// A point in the frame of the original camera projects through its lens onto the pixel it comes from.
 #[test]
-fn points_are_where_the_original_camera_sees_them() {
+fn points_project_onto_their_original_pixels() {
     for (name, cameras, size) in rigs() {
         let by = rectification(&cameras, size, 0.16);
         let rectified = Rig::new(&by.calibration().unwrap()).unwrap();
@@ -144,7 +144,7 @@ fn points_are_where_the_original_camera_sees_them() {
         }
         println!("{name}: {most:.1e} px at most, {least:.2} px at least in the rectified frame");
         assert!(most < 1e-9, "{name}: {most}");
-        // Control: the points of the rectified frame are seen elsewhere.
+        // Control: points in the rectified frame project elsewhere.
         assert!(least > 0.5, "{name}: {least}");
     }
 }
@@ -159,7 +159,7 @@ fn the_raw_pair_is_what_the_cameras_see() {
     assert_eq!(text, raw::calibration(&CAMERAS, SIZE, raw::baseline(&scene)));
 }
 
-/// The bits of the rectified pair and of its calibration are the same on every machine.
+/// The rectified pair and its calibration have the same bits on every machine.
 #[test]
 fn the_bits_are_the_same_everywhere() {
     let folder = Path::new("testdata/raw");
@@ -187,7 +187,7 @@ fn the_bits_are_the_same_everywhere() {
     assert_eq!(found, known, "{found:#x?}");
 }
 
-/// Where the places are kept, nothing changes.
+/// Keeping the source positions changes no result.
 #[test]
 fn places_may_be_kept() {
     let scene = raw::scene();
@@ -218,7 +218,7 @@ fn a_mask_is_rectified_with_its_image() {
     assert_eq!(pair.left(), whole.left());
     for (x, y) in (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y))) {
         let [u, v] = by.right(x as f64, y as f64).unwrap();
-        // The cubic takes pixels up to two away.
+        // Cubic interpolation reads pixels up to two away.
         let well_inside = (100.0..129.0).contains(&u) && (60.0..79.0).contains(&v);
         let well_outside = !((97.0..132.0).contains(&u) && (57.0..82.0).contains(&v));
         let masked = pair.right().masked[(x, y)];
@@ -232,12 +232,12 @@ fn a_mask_is_rectified_with_its_image() {
 }
 
 #[test]
-fn a_calibration_counts_for_images_of_another_size() {
+fn a_calibration_applies_to_images_of_another_size() {
     let calibration = of_texts(&[(Path::new("cameras.yml"), raw::calibration(&CAMERAS, SIZE, 0.1))]).unwrap();
     let (width, height) = SIZE;
     let options = Options::default();
     let own = Rectification::new(&calibration, SIZE, &options).unwrap();
-    // Where the left image shows what a rectified one has in this direction.
+    // The pixel of the left image in this direction of the rectified view.
     let seen = |by: &Rectification, ray: [f64; 2]| {
         let calib::Camera { focal_length, principal_point } = by.calibration().unwrap().camera.unwrap();
         let [x, y] = [0, 1].map(|i| focal_length[i] * ray[i] + principal_point[i]);
@@ -257,11 +257,11 @@ fn a_calibration_counts_for_images_of_another_size() {
     let cut = Rectification::new(&part, (width, height - 40), &options).unwrap();
     assert_eq!(cut.doubts(), []);
     same(&cut, &|v| v, 20.0);
-    // Control: without the part nothing tells what these images show.
+    // Control: without the crop, the calibration does not tell what these images show.
     assert!(Rectification::new(&calibration, (width, height - 40), &options).is_err());
     let outside = calibration.of_part(&Rect { x: 0..width, y: 20..height + 20 }).unwrap_err();
     assert!(outside.to_string().contains("not inside"), "{outside}");
-    // Only the right images are twice as large.
+    // Only the right image is twice as large.
     let mixed = Rectification::of_sizes(&calibration, [SIZE, (2 * width, 2 * height)], &options).unwrap();
     assert_eq!(mixed.size(), SIZE);
     let (x, y) = (50.0, 40.0);
@@ -271,7 +271,7 @@ fn a_calibration_counts_for_images_of_another_size() {
 }
 
 #[test]
-fn rigs_that_give_no_pair_are_told() {
+fn rigs_that_cannot_be_rectified_are_refused() {
     let refused = |change: &dyn Fn(&mut [Camera; 2], &mut f64), options: Options, size, words: &str| {
         let (mut cameras, mut baseline) = (CAMERAS, 0.1);
         change(&mut cameras, &mut baseline);

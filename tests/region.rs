@@ -1,4 +1,4 @@
-//! A region of the left view: its maps are nearly those of the whole pair, the same on every device, and cost what the region costs.
+//! Regions of the left view: nearly the maps of the whole pair, the same on every device, at the cost of the region.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -28,7 +28,7 @@ fn part_of(pair: &Pair, part: &Rect, method: &Method) -> Maps {
     cpu().job(pair, RANGE).method(method).region(part.clone()).run().unwrap().maps
 }
 
-/// How many pixels of a hundred differ by more than one pixel.
+/// The percentage of pixels that differ by more than 1 px.
 fn moved(some: &Plane<f32>, others: &Plane<f32>) -> f64 {
     assert_eq!(some.size(), others.size());
     let pixels = some.data().iter().zip(others.data());
@@ -46,21 +46,21 @@ fn a_region_is_nearly_a_part_of_the_whole() {
             let found = part_of(&pair, &part, &method);
             let off = moved(&found.final_map(), &whole.crop(&part).final_map());
             assert!(off <= 1.5, "{name}: {off} %");
-            // Control: without what lies around it, and without what the right view has of it, it is another map.
+            // Control: the pair cropped to the region gives a different map.
             let alone = cpu().job(&pair.crop(&part), RANGE).method(&method).run().unwrap().maps;
             let off_alone = moved(&alone.final_map(), &whole.crop(&part).final_map());
             assert!(off_alone > 4.0 * off && off_alone > 4.0, "{name}: {off_alone} % and {off} %");
         }
     }
-    // All of it is the whole, bit for bit.
+    // The region of the whole image gives the same bits as the pair.
     let pair = scene("slanted");
     let whole = cpu().run(&pair, RANGE).unwrap().maps;
     assert!(part_of(&pair, &Rect::whole(pair.size()), &Method::default()) == whole);
 }
 
-/// What is outside of the window plays no part.
+/// Pixels outside the window of a region have no influence.
 #[test]
-fn nothing_else_is_looked_at() {
+fn pixels_outside_have_no_influence() {
     let (pair, part) = (scene("slanted"), Rect { x: 130..190, y: 100..140 });
     let found = part_of(&pair, &part, &Method::default());
     let without = |image: &Image, x: usize, y: usize| {
@@ -72,7 +72,7 @@ fn nothing_else_is_looked_at() {
     };
     let changed = |x, y| Pair::new(without(pair.left(), x, y), without(pair.right(), x, y)).unwrap();
     assert!(part_of(&changed(64, 64), &part, &Method::default()) == found);
-    // Control.
+    // Control: pixels inside the window do have influence.
     assert!(part_of(&changed(120, 130), &part, &Method::default()) != found);
 }
 
@@ -102,7 +102,7 @@ fn regions_have_their_size_and_lie_inside() {
     let error = cpu().job(&pair, RANGE).region(outside.clone()).run().unwrap_err();
     assert!(matches!(&error, Error::Mismatch(reason) if reason.contains("100 to 500")), "{error}");
     assert!(Region::new(outside, pair.size(), RANGE).is_err());
-    // A found range is that of the whole pair.
+    // An automatic range is that of the whole pair.
     let found = cpu().job(&pair, ..).region(part).run().unwrap();
     assert!(found.range_found && found.maps.disparity.size() == (4, 3));
 }

@@ -1,4 +1,4 @@
-//! Depths in the view of a third camera, against what that camera sees of the ray-cast scenes.
+//! Depths registered to a third camera, compared with the ray-cast depths of its view.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -22,7 +22,7 @@ use scenes::Scene;
 
 fn thirds() -> [(&'static str, Camera); 3] {
     let fisheye = Camera { focal: 170.0, lens: Lens::Equidistant([0.02, 0.004, -0.001, 0.0]), ..THIRD };
-    // It sees each pixel of the pair five times as wide.
+    // This camera magnifies each pixel of the pair five times.
     let tele = Camera { focal: 900.0, lens: Lens::RadialTangential([0.0; 5]), ..THIRD };
     [("pinhole", THIRD), ("fisheye", fisheye), ("tele", tele)]
 }
@@ -31,18 +31,18 @@ fn read(camera: &Camera, pose: (Matrix, [f64; 3])) -> ThirdCamera {
     third::of_text(Path::new("third.yml"), &raw::third(camera, THIRD_SIZE, pose)).unwrap()
 }
 
-/// How a map compares with what the third camera sees.
+/// How a registered map compares with the true depths of the third camera.
 #[derive(Debug)]
 struct Shares {
-    /// Of the pixels whose point the left view sees, those that have a depth,
+    /// The share of pixels with a depth, among those whose point the left view sees.
     covered: f64,
-    /// and of these, those that are right to 1 %.
+    /// The share of those depths that are within 1 % of the truth.
     right: f64,
-    /// Of the pixels whose point the left view does not see, those that have a depth.
+    /// The share of pixels with a depth, among those whose point the left view does not see.
     invented: f64,
 }
 
-/// `map` against the depths of the scene. The left view sees a point where it is nothing nearer on its way.
+/// Compares `map` with the true depths. The left view sees a point unless a nearer surface hides it.
 fn shares(map: &Plane<f32>, scene: &Scene, camera: &Camera) -> Shares {
     let truth = scenes::world(scene.name).depths(THIRD_SIZE, raw::third_eye(scene), |x, y| camera.ray(x, y));
     let baseline = raw::baseline(scene);
@@ -56,7 +56,7 @@ fn shares(map: &Plane<f32>, scene: &Scene, camera: &Camera) -> Shares {
         };
         let [u, v] = raw::pixel((width, height), point).map(f64::round);
         let inside = point[2] > 0.0 && u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64;
-        // Up to a pixel of disparity, as the centre of the pixel is not the point itself.
+        // How much nearer the surface in the left view is than the point, in px of disparity.
         let near = |u: f64, v: f64| {
             f64::from(scene.truth[(u as usize, v as usize)]) - baseline * height as f64 / point[2]
         };
@@ -95,7 +95,7 @@ fn a_third_camera_sees_what_the_left_one_does() {
                 "{name}, {of}: {found:?}"
             );
 
-            // Controls: a camera on the other side sees other depths, and a map with holes leaves holes.
+            // Controls: a camera on the other side sees other depths, and holes in a map leave holes.
             let other = shares(&scene.truth, (rotation, translation.map(|v| -v)));
             assert!(other.right < 0.9, "{name}, {of}: {other:?}");
             let even = |x, y| if (x + y) % 2 == 0 { scene.truth[(x, y)] } else { f32::INFINITY };
@@ -105,7 +105,7 @@ fn a_third_camera_sees_what_the_left_one_does() {
     }
 }
 
-/// Half of the errors of the depths of `map` are below this part of the depth.
+/// The median relative error of the depths of `map`.
 fn median_error(map: &Plane<f32>, scene: &Scene, camera: &Camera) -> f64 {
     let truth = scenes::world(scene.name).depths(THIRD_SIZE, raw::third_eye(scene), |x, y| camera.ray(x, y));
     let both = map.data().iter().zip(truth.data()).filter(|(found, _)| found.is_finite());
@@ -116,7 +116,7 @@ fn median_error(map: &Plane<f32>, scene: &Scene, camera: &Camera) -> f64 {
 }
 
 #[test]
-fn depths_of_a_raw_pair_go_by_the_camera_that_took_it() {
+fn depths_of_a_raw_pair_follow_its_rectification() {
     let scene = raw::scene();
     let baseline = raw::baseline(&scene);
     let text = raw::calibration(&CAMERAS, SIZE, baseline);
@@ -135,19 +135,19 @@ fn depths_of_a_raw_pair_go_by_the_camera_that_took_it() {
         let found = error(&rig);
         println!("{of}: {found:.4}");
         assert!(found < 0.006, "{of}: {found}");
-        // Which frame points have plays no part.
+        // The frame of the points makes no difference.
         assert_eq!(
             rig.registered(&map, &third),
             rig.in_original_frame(&by.rotations()[0]).registered(&map, &third)
         );
-        // Control: by the rectified camera they are further off.
+        // Control: without the rotation of the rectification the depths are worse.
         let crooked = error(&rectified);
         assert!(crooked > 2.0 * found, "{of}: {crooked} and {found}");
     }
 }
 
 #[test]
-fn the_files_of_the_third_camera_are_what_the_renderer_makes() {
+fn the_files_of_the_third_camera_are_a_fresh_rendering() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/raw");
     let (scene, pose) = (raw::scene(), raw::third_pose(&THIRD, &CAMERAS[0].turn));
     assert_eq!(

@@ -1,4 +1,4 @@
-//! The rendered scenes: `testdata/` holds what the renderer makes, and the ground truth is right.
+//! The rendered scenes: `testdata/` holds the output of the renderer, and its ground truth is correct.
 
 #[path = "../testdata/scenes.rs"]
 mod scenes;
@@ -13,14 +13,14 @@ use scenes::Scene;
 static SCENES: LazyLock<Vec<Scene>> =
     LazyLock::new(|| scenes::ALL.iter().map(scenes::Recipe::render).collect());
 
-/// Scenes of a rig at fault.
+/// Scenes of a defective rig.
 const AT_FAULT: [&str; 3] = ["rows", "focus", "grain"];
 
 fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name)
 }
 
-/// The contents of a little-endian, one-channel PFM file with these values.
+/// The bytes of a little-endian, one-channel PFM file with these values.
 fn pfm(plane: &Plane<f32>) -> Vec<u8> {
     let mut bytes = format!("Pf\n{} {}\n-1.0\n", plane.width(), plane.height()).into_bytes();
     for y in (0..plane.height()).rev() {
@@ -29,9 +29,9 @@ fn pfm(plane: &Plane<f32>) -> Vec<u8> {
     bytes
 }
 
-/// Between frames of the sequence, what passes by moves, and all else stays but for the noise.
+/// Between frames of the sequence only the passing objects move; the rest changes by noise alone.
 #[test]
-fn things_pass_by() {
+fn passing_objects_move() {
     let [first, next] = [0, 1].map(|step| scenes::passing(step, 120, 90, 24));
     let moves = |x: usize, y: usize| (first.truth[(x, y)] - next.truth[(x, y)]).abs() > 1e-6;
     let moving = (0..90).flat_map(|y| (0..120).map(move |x| (x, y))).filter(|(x, y)| moves(*x, *y)).count();
@@ -45,7 +45,7 @@ fn things_pass_by() {
     }
     let changed = still.iter().filter(|off| **off > 0).count();
     assert!(2 * changed > still.len(), "noise changes most pixels");
-    // But for shadows.
+    // Moving shadows change some pixels.
     let small = still.iter().filter(|off| **off <= 6).count();
     assert!(small as f64 > 0.97 * still.len() as f64, "{small} of {}", still.len());
 }
@@ -57,7 +57,7 @@ fn the_files_are_a_fresh_rendering() {
     let mut folders: Vec<_> = fs::read_dir(folder("")).unwrap().map(Result::unwrap).collect();
     folders.retain(|entry| entry.file_type().unwrap().is_dir());
     let mut folders: Vec<_> = folders.iter().map(|entry| entry.file_name().into_string().unwrap()).collect();
-    // The raw pair is that of tests/rectification.rs; the caster's folder holds code.
+    // tests/rectification.rs covers the raw pair, and the folder of the caster holds code.
     folders.retain(|name| !["raw", "caster"].contains(&name.as_str()));
     folders.sort();
     assert_eq!(names, folders, "every folder is a scene's, and every scene has one");
@@ -106,7 +106,7 @@ fn the_truth_is_inside_the_labels() {
 }
 
 #[test]
-fn any_size_will_do() {
+fn scenes_render_at_any_size() {
     for recipe in scenes::ALL {
         for (width, height, labels) in [(1, 1, 2), (61, 47, 9), (7, 90, 64), (90, 30, 60), (24, 18, 36)] {
             let scene = scenes::render(recipe.name, width, height, labels);
@@ -175,7 +175,7 @@ fn visible_points_look_alike_in_both_views() {
 }
 
 #[test]
-fn only_the_scene_of_that_name_differs_in_exposure() {
+fn only_the_exposure_scene_differs_in_exposure() {
     for scene in SCENES.iter() {
         let means = [&scene.left, &scene.right].map(|view| {
             let bytes = view.data().as_flattened();
@@ -186,7 +186,7 @@ fn only_the_scene_of_that_name_differs_in_exposure() {
 }
 
 #[test]
-fn sensors_that_differ_leave_their_mark() {
+fn different_sensors_leave_their_mark() {
     for scene in SCENES.iter() {
         let truth = |x: usize, y: usize| scene.truth[(x, y)];
         let as_seen = difference(scene, truth, |level, _, _| f32::from(level));
@@ -204,10 +204,10 @@ fn sensors_that_differ_leave_their_mark() {
     }
 }
 
-/// Rigs at fault see the still life, but the right view of `rows` lies 0.6 rows lower, that of `focus` has lost its detail, and both
-/// views of `grain` have noise.
+/// Defective rigs see the scene `mixed`: the right view of `rows` is 0.6 rows lower, that of `focus` is
+/// blurred, and both views of `grain` are noisy.
 #[test]
-fn faults_are_what_they_are_said_to_be() {
+fn defective_rigs_have_their_defects() {
     let of = |name: &str| SCENES.iter().find(|scene| scene.name == name).unwrap();
     let sound = scenes::render("mixed", 240, 180, 32);
     let green = |view: &Plane<[u8; 3]>, x: usize, y: usize| f64::from(view[(x, y)][1]);
@@ -236,10 +236,10 @@ fn faults_are_what_they_are_said_to_be() {
     }
 }
 
-/// The purpose of `light`: points of the wall differ by some levels near the sides, and hardly at all in
-/// between.
+/// The scene `light` tests vignetting: points of the wall differ by several levels near the sides, and hardly
+/// in between.
 #[test]
-fn the_fall_off_of_light_differs_by_some_levels() {
+fn vignetting_differs_by_several_levels() {
     let scene = SCENES.iter().find(|scene| scene.name == "light").unwrap();
     let (width, height) = scene.left.size();
     let at = |x: usize, y: usize| {
@@ -255,9 +255,9 @@ fn the_fall_off_of_light_differs_by_some_levels() {
 #[test]
 fn the_mask_follows_from_the_truth_of_both_views() {
     for scene in SCENES.iter() {
-        // Visible in the right view: at one of the two pixels next to x - d the right view has that
-        // disparity. This rule looks at pixel centres only, so it is wrong along some silhouettes where the
-        // mask is right.
+        // A pixel counts as visible in the right view if one of the two pixels next to x - d has its
+        // disparity there.
+        // This rule tests pixel centres only, so it fails along some silhouettes where the mask is right.
         let seen = |x: usize, y: usize| {
             let d = scene.truth[(x, y)];
             let at = x as f32 - d;

@@ -1,4 +1,4 @@
-//! Pairs in sequence through one matcher: the same maps as one by one, in order, while the device is kept
+//! Sequences of pairs through one matcher: the same maps as one by one, in order, with the device always
 //! busy.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
@@ -19,7 +19,7 @@ use std::sync::mpsc::channel;
 use std::sync::{Mutex, mpsc::Receiver};
 use std::time::Duration;
 
-/// Pairs of several sizes and ranges; some recur, and one needs tiles under [`method`].
+/// Pairs of several sizes and ranges; some repeat, and one needs tiles under [`method`].
 fn pairs() -> Vec<(Pair, DisparityRange)> {
     let mut random = Random::new(5);
     [(40, 24, 15), (40, 24, 15), (33, 50, 21), (300, 260, 40), (40, 24, 15), (33, 50, 21)]
@@ -47,12 +47,12 @@ fn one_by_one() -> Vec<Maps> {
     };
     let (maps, tiles): (Vec<_>, Vec<_>) = pairs().into_iter().map(&mut run).unzip();
     assert_eq!(tiles.iter().filter(|&&count| count > 1).count(), 1, "{tiles:?}");
-    // Control: confusing two of them would be detected.
+    // Control: all maps differ, so exchanged pairs would be detected.
     assert!((1..maps.len()).all(|i| maps[..i].iter().all(|other| *other != maps[i])));
     maps
 }
 
-/// The results of `matcher` for `pairs`, and the order in which they were requested and returned.
+/// The results of `matcher` for `pairs`, and a log of the order of requests and results.
 fn all(
     matcher: &mut Matcher,
     pairs: Vec<(Pair, DisparityRange)>,
@@ -81,7 +81,7 @@ fn assert_same(found: Vec<Matched>, expected: &[Maps]) {
 }
 
 #[test]
-fn a_sequence_is_its_pairs() {
+fn a_sequence_equals_its_single_pairs() {
     let expected = one_by_one();
     for threads in [1, 2, 5] {
         let mut matcher = Matcher::builder().device("cpu").threads(threads).build().unwrap();
@@ -89,7 +89,7 @@ fn a_sequence_is_its_pairs() {
         result.unwrap();
         assert!((0..6).all(|i| log.contains(&format!("ask {i}, ")) && log.contains(&format!("take {i}, "))));
         assert_same(found, &expected);
-        // Unfinished work does not show up in the next sequence.
+        // Unfinished work does not affect the next sequence.
         let (result, found, _) = all(&mut matcher, pairs(), 2);
         result.unwrap();
         assert_same(found, &expected[..2]);
@@ -102,18 +102,17 @@ fn a_sequence_is_its_pairs() {
     let mut matcher = Matcher::on(Ok(gpu), false, &Execution::default()).unwrap();
     let (result, found, log) = all(&mut matcher, pairs(), usize::MAX);
     result.unwrap();
-    // A device gets the next pair before it returns the last one's maps, except for the pair in tiles.
+    // A device receives the next pair before it returns the maps of the last, except for the pair in tiles.
     let order = "ask 0, ask 1, take 0, ask 2, take 1, ask 3, take 2, take 3, ask 4, ask 5, take 4, take 5, ";
     assert_eq!(log, order);
     for matched in &found {
         assert!(!matched.ran_on.contains("CPU path") && matched.traffic.bytes_up > 0, "{}", matched.ran_on);
-        // Three maps of four bytes per pixel, and nothing of the next pair.
+        // Three maps of four bytes per pixel; nothing of the next pair is counted.
         let (width, height) = matched.plan.size();
         let down = matched.traffic.bytes_down as usize;
         assert!(down >= 12 * width * height && (matched.tiles.count() > 1 || down < 60 * width * height));
     }
     assert_same(found, &expected);
-    // Unfinished work does not show up in the next sequence.
     let (result, found, log) = all(&mut matcher, pairs(), 2);
     result.unwrap();
     assert_eq!(log, "ask 0, ask 1, take 0, ask 2, take 1, ");
@@ -123,14 +122,14 @@ fn a_sequence_is_its_pairs() {
     assert_same(found, &expected);
 }
 
-/// Waits for news, but not for ever.
+/// Waits for a message, with a time limit.
 fn heard<T>(from: &Receiver<T>) -> T {
     from.recv_timeout(Duration::from_secs(60)).expect("what this waits for never comes")
 }
 
-/// The CPU path is at several pairs at once: two of them are under way, and a third one is asked for, before the first is taken.
+/// The CPU path matches pairs in parallel: two are in progress and a third is requested before the first is taken.
 #[test]
-fn the_cpu_path_matches_pairs_side_by_side() {
+fn the_cpu_path_matches_pairs_in_parallel() {
     let expected = one_by_one();
     let mut matcher = Matcher::builder().device("cpu").threads(2).build().unwrap();
     matcher.set_method(method());
@@ -149,7 +148,7 @@ fn the_cpu_path_matches_pairs_side_by_side() {
     assert_same(found, &expected[..3]);
 }
 
-/// Who gets a frame now and then has its map before the next frame comes.
+/// A slow source gets the map of each frame before its next frame.
 #[test]
 fn a_result_does_not_wait_for_the_next_pair() {
     let expected = one_by_one();
@@ -171,9 +170,9 @@ fn a_result_does_not_wait_for_the_next_pair() {
     assert_same(found, &expected);
 }
 
-/// Wherever in the sequence a device is lost, the CPU path takes over, and no pair is lost or duplicated.
+/// Wherever in the sequence a device is lost, the CPU path takes over, and each pair is matched once.
 #[test]
-fn a_device_lost_on_the_way_costs_no_pair() {
+fn a_device_lost_within_a_sequence_costs_no_pair() {
     let expected = one_by_one();
     let (mut by_device, mut by_cpu) = (false, false);
     for stages in [0, 30, 200, 250, 300, 400, 500, 700] {
@@ -191,12 +190,12 @@ fn a_device_lost_on_the_way_costs_no_pair() {
     assert!(by_device && by_cpu);
 }
 
-/// A pair that cannot be matched ends the sequence, after those before it are returned.
+/// A pair that cannot be matched ends the sequence, after the pairs before it are returned.
 #[test]
 fn results_before_a_failure_are_handed_out() {
     let expected = one_by_one();
     let mut with_a_bad_one = pairs();
-    // No tile is small enough for the method's memory.
+    // The memory of the method is too small for any tile.
     with_a_bad_one[2].1 = DisparityRange::new(0, 16_000).unwrap();
     let mut matchers = vec![on_cpu()];
     matchers.extend(
@@ -211,7 +210,7 @@ fn results_before_a_failure_are_handed_out() {
     }
 }
 
-/// A sequence that is told to stop ends within the matches that run.
+/// A stopped sequence ends during the running matches.
 #[test]
 fn a_sequence_can_be_stopped() {
     let expected = one_by_one();
@@ -232,11 +231,11 @@ fn a_sequence_can_be_stopped() {
             ControlFlow::Continue(())
         });
         assert_eq!(result, Err(Error::Interrupted), "{}", found.len());
-        // The CPU path may have been at both of them.
+        // The CPU path may have matched both already.
         assert!(found.len() <= 2);
         let count = found.len();
         assert_same(found, &expected[..count]);
-        // Control: without a reason to stop it goes to the end, also after that.
+        // Control: without a stop the sequence runs to its end, also after a stopped one.
         let (stop, mut count) = (AtomicBool::new(false), 0);
         let result = matcher.run_all_until(pairs(), &stop, |_| {
             count += 1;

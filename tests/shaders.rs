@@ -1,5 +1,5 @@
-//! Every shader, in every variant that a plan can need, without a device: it validates without any
-//! capability, its layouts match the Rust structs, it stays within the limits of every device, and it
+//! Every shader in every variant that a plan can need, without a device: it validates without optional
+//! capabilities, its layouts match the Rust structs, it stays within the limits of every device, and it
 //! translates to the shading languages of all platforms.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
@@ -62,12 +62,12 @@ fn every_stage_has_a_shader_and_every_shader_a_stage() {
     let kernels: HashSet<String> = KERNELS.iter().map(|kernel| kernel.shader.stage.to_owned()).collect();
     assert_eq!(files, kernels);
     let mut stages: HashSet<&str> = PLANS.iter().flat_map(Stage::all).map(Stage::name).collect();
-    // The sweep has no shader of its own. Filled pixels take planes and medians by the shaders of these. The upload is no stage.
+    // The sweep and `fill_plane` run shaders of other stages, and the upload is no stage.
     assert!(stages.remove("flood") && stages.remove("fill_plane") && stages.insert("upload"));
     assert_eq!(kernels, stages.into_iter().map(str::to_owned).collect());
 }
 
-/// Every entry point of a file is used.
+/// Every entry point of a shader file is used.
 #[test]
 fn every_entry_point_is_a_kernel() {
     let used: HashSet<(&str, &str)> =
@@ -79,7 +79,7 @@ fn every_entry_point_is_a_kernel() {
 }
 
 #[test]
-fn every_shader_validates_and_no_capability_is_asked() {
+fn every_shader_validates_without_capabilities() {
     for_every_kernel(|_, _, _| Ok(()));
 }
 
@@ -95,7 +95,7 @@ fn validation_can_fail() {
     );
 }
 
-/// The struct called `name`: its fields with their offsets, and its size in bytes.
+/// The fields of the struct `name` with their offsets, and its size in bytes.
 fn layout_of(module: &Module, name: &str) -> Result<(Vec<(String, usize)>, usize), String> {
     let found = module.types.iter().find_map(|(_, t)| match &t.inner {
         TypeInner::Struct { members, span } if t.name.as_deref() == Some(name) => {
@@ -125,9 +125,9 @@ fn uniforms_are_laid_out_as_the_rust_structs() {
     });
 }
 
-/// Control: a moved field is detected.
+/// Control: an exchanged field is detected.
 #[test]
-fn a_uniform_of_another_layout_is_noticed() {
+fn a_different_uniform_layout_is_noticed() {
     let kernel = &kernels(Stage::Evidence(0), &PLANS[0])[0];
     let source = kernel.shader.source();
     let fields = |source: &str| layout_of(&validated(source).unwrap().0, "Params").unwrap().0;
@@ -140,12 +140,12 @@ fn a_uniform_of_another_layout_is_noticed() {
     )));
 }
 
-/// The index of the kernel's entry point.
+/// The index of the entry point of the kernel.
 fn entry_point(kernel: &Kernel, module: &Module) -> usize {
     module.entry_points.iter().position(|e| e.name == kernel.shader.entry).expect("it compiles")
 }
 
-/// Compares what `kernel` binds with what its entry point uses of the shader with this `source`.
+/// Checks that `kernel` binds exactly the variables that its entry point uses in `source`.
 fn check_bindings(kernel: &Kernel, source: &str) -> Result<(), String> {
     let (module, info) = validated(source)?;
     let info = info.get_entry_point(entry_point(kernel, &module));
@@ -166,10 +166,10 @@ fn every_kernel_binds_what_its_entry_point_uses() {
     for_every_kernel(|kernel, _, _| check_bindings(kernel, &kernel.shader.source()));
 }
 
-/// Control: names that the shader does not have, that the entry point does not use, or that are missing, are
-/// noticed.
+/// Control: bindings that the shader lacks, that the entry point does not use, or that are missing, are
+/// detected.
 #[test]
-fn other_bindings_are_noticed() {
+fn wrong_bindings_are_noticed() {
     let kernel = &kernels(Stage::Evidence(0), &PLANS[0])[0];
     let source = kernel.shader.source();
     let names = |kernel: &Kernel| kernel.bound.iter().map(|bound| bound.name).collect::<Vec<_>>();
@@ -214,7 +214,7 @@ fn every_shader_stays_within_the_limits_of_all_devices() {
 }
 
 #[test]
-fn loops_stay_below_what_drivers_run() {
+fn loops_stay_below_the_limit_of_drivers() {
     let count = |plan: &Plan| {
         let kernels = Stage::all(plan).into_iter().flat_map(|stage| kernels(stage, plan));
         kernels.map(|kernel| kernel.loops).max().unwrap()

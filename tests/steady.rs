@@ -1,4 +1,4 @@
-//! Video that holds still where the scene does, against the truth of rendered sequences.
+//! Temporal filtering of video: still surfaces stay still, compared with the truth of rendered sequences.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -15,7 +15,7 @@ const SIZE: (usize, usize) = (240, 180);
 const LABELS: u32 = 32;
 const FRAMES: u32 = 12;
 
-/// A frame with its truth, its left view and what a match of it alone finds.
+/// A scene with its truth, the pair of its views, and the maps of matching it alone.
 type Frame = (Scene, Pair, Maps);
 
 fn frames(sequence: fn(u32, usize, usize, u32) -> Scene, method: &Method) -> Vec<Frame> {
@@ -29,7 +29,7 @@ fn frames(sequence: fn(u32, usize, usize, u32) -> Scene, method: &Method) -> Vec
     matched.collect()
 }
 
-/// The maps, alone and with a filter that sees `view` of each frame.
+/// The maps without the filter, and with a filter that is given `view` of each frame.
 fn both<'a>(frames: &'a [Frame], view: impl Fn(&'a Frame) -> &'a Image) -> [Vec<Plane<f32>>; 2] {
     let alone = frames.iter().map(|(_, _, maps)| maps.final_map()).collect();
     let mut steady = Steady::new();
@@ -45,7 +45,7 @@ fn own(frame: &Frame) -> &Image {
     frame.1.left()
 }
 
-/// Whether something moves within `radius` pixels between two frames.
+/// The pixels within `radius` of a change of the truth between two frames.
 fn moves(frames: &[Frame], step: usize, radius: usize) -> Plane<bool> {
     let [before, now] = [step - 1, step].map(|step| &frames[step].0.truth);
     let moved = Plane::from_fn(SIZE.0, SIZE.1, |x, y| (before[(x, y)] - now[(x, y)]).abs() > 1e-6);
@@ -54,7 +54,7 @@ fn moves(frames: &[Frame], step: usize, radius: usize) -> Plane<bool> {
     Plane::from_fn(SIZE.0, SIZE.1, |x, y| near(y, SIZE.1).any(|y| across[(x, y)]))
 }
 
-/// Means over the pixels of all frames but the first for which `counts`.
+/// The mean of `value` over the pixels in `counts`, of all frames but the first.
 fn mean(value: impl Fn(usize, usize, usize) -> f64, counts: impl Fn(usize) -> Plane<bool>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for step in 1..FRAMES as usize {
@@ -73,13 +73,13 @@ fn everywhere(_: usize) -> Plane<bool> {
     Plane::filled(SIZE.0, SIZE.1, true)
 }
 
-/// The mean change from frame to frame where nothing moves.
+/// The mean change between frames where nothing moves.
 fn flicker(frames: &[Frame], maps: &[Plane<f32>]) -> f64 {
     let change = |step: usize, x, y| f64::from((maps[step][(x, y)] - maps[step - 1][(x, y)]).abs());
     mean(change, |step| moves(frames, step, 12).map(|moves| !moves))
 }
 
-/// The mean error, and the share of the pixels that are more than 1 px off.
+/// The mean error, and the share of pixels more than 1 px off.
 fn errors(frames: &[Frame], maps: &[Plane<f32>], counts: impl Fn(usize) -> Plane<bool>) -> [f64; 2] {
     let off = |step: usize, x, y| f64::from((maps[step][(x, y)] - frames[step].0.truth[(x, y)]).abs());
     [mean(off, &counts), mean(|step, x, y| f64::from(u8::from(off(step, x, y) > 1.0)), &counts)]
@@ -101,7 +101,7 @@ fn still_surfaces_hold_still_and_moving_things_leave_no_trail() {
             "{name}: flicker {before:.4} to {now:.4} px, error {error_before:.4?} to {error:.4?}, near what moves {trail_before:.4?} to \
              {trail:.4?}"
         );
-        // Control: what always sees the first frame takes all for unchanged, and leaves trails.
+        // Control: a filter that is always given the first frame sees no motion, and leaves trails.
         let [_, blind] = both(&frames, |_| own(&frames[0]));
         let trail_of_blind = errors(&frames, &blind, near);
         assert!(trail_of_blind[0] > 1.3 * trail_before[0], "{name}: {trail_of_blind:.4?}");
@@ -109,13 +109,13 @@ fn still_surfaces_hold_still_and_moving_things_leave_no_trail() {
 }
 
 #[test]
-fn a_camera_that_moves_loses_nothing() {
+fn a_moving_camera_costs_no_accuracy() {
     let frames = frames(scenes::moving, &Method::default());
     let [alone, steady] = both(&frames, own);
     let [before, now] = [&alone, &steady].map(|maps| errors(&frames, maps, everywhere));
     println!("error {before:.4?} to {now:.4?}");
     assert!(now[0] < 1.01 * before[0] && now[1] < 1.01 * before[1], "{before:.4?} to {now:.4?}");
-    // Control: as above.
+    // Control: a filter that sees no motion.
     let [_, blind] = both(&frames, |_| own(&frames[0]));
     let blind = errors(&frames, &blind, everywhere);
     assert!(blind[0] > 1.3 * before[0], "{blind:.4?}");

@@ -1,5 +1,5 @@
-//! Matches of which only some rows of level 0 are held at a time: the same maps as with all rows, the memory that was planned, and
-//! nothing left over from the pair before.
+//! Streamed matches, which hold only some rows of level 0 at a time: the same maps as with all rows, within the planned
+//! memory, and independent of the pair before.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -20,7 +20,7 @@ use mrfgs::options::{MatchingCost, Method, Order};
 use mrfgs::{Error, Matcher};
 use std::ops::ControlFlow;
 
-/// The maps of a match; `whole` holds all rows, because somebody looks in.
+/// The maps of a match; with `whole` an inspector makes it hold all rows.
 fn maps(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, whole: bool) -> Maps {
     let observer = &mut |_| ControlFlow::Continue(());
     let mut looks = 0;
@@ -34,14 +34,14 @@ fn maps(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, whole: bool) -> Map
     maps
 }
 
-/// The plan of a match that may take so little memory that a device, which would rather hold all rows, does not either.
+/// A plan with so little memory that a device, which prefers to hold all rows, streams as well.
 fn plan(size: (usize, usize), min: i32, labels: usize, method: &Method) -> Plan {
     let mut method = method.clone();
     method.tiles.memory = 1;
     random::plan(size, min, labels, &method)
 }
 
-/// Any method whose level 0 is streamed: it takes the levels one after the other and compares by a census.
+/// A random method that streams level 0: coarse-first order, and a matching cost computed by rows.
 fn method(random: &mut Random) -> Method {
     let neighbours = random.pick(&[0, 2, 2, 4]);
     let mut method = random::method(random, neighbours);
@@ -55,7 +55,7 @@ fn method(random: &mut Random) -> Method {
 }
 
 #[test]
-fn streamed_maps_are_those_of_whole_levels() {
+fn streamed_maps_equal_those_of_whole_levels() {
     let mut random = Random::new(17);
     let (mut held_less, mut held_costs, mut differ) = (0, 0, 0);
     for i in 0..50 {
@@ -68,11 +68,11 @@ fn streamed_maps_are_those_of_whole_levels() {
         let held = streamed(&plan);
         held_less += usize::from(!held.holds_all_rows());
         assert!(held.bytes() <= plan.bytes());
-        // With enough memory the CPU path holds all costs.
+        // With enough memory the CPU path keeps all costs.
         let more = Plan { memory: 4096, ..plan.clone() };
         held_costs += usize::from(streamed(&more).on_host().holds_costs);
         assert!(!held.on_host().holds_costs && expected == maps(&mut Cpu::default(), &more, &pair, false));
-        // A device takes longer.
+        // The device is slower, so it runs every third case only.
         for (name, mut backend) in devices::backends().into_iter().take(if i % 3 == 0 { 2 } else { 1 }) {
             assert!(
                 expected == maps(&mut *backend, &plan, &pair, false),
@@ -84,7 +84,7 @@ fn streamed_maps_are_those_of_whole_levels() {
                 "{name} holds {took} of {bound} bytes: {size:?}, {labels} labels, {method:?}"
             );
         }
-        // Control: what is compared differs from pair to pair.
+        // Control: the maps differ from pair to pair.
         let other = random::pair(&mut random, size.0, size.1);
         differ += usize::from(expected != maps(&mut Cpu::default(), &plan, &other, false));
     }
@@ -108,7 +108,7 @@ fn a_device_streams_images_of_any_height() {
     }
 }
 
-/// Where buffers are small, the parts of a ring have fewer rows.
+/// In small buffers a ring is split into pieces of fewer rows.
 #[test]
 fn a_device_streams_in_small_buffers() {
     let mut random = Random::new(21);
@@ -116,7 +116,7 @@ fn a_device_streams_in_small_buffers() {
     assert!(!streamed(&plan).holds_all_rows());
     let pair = random::pair(&mut random, 40, 300);
     let expected = maps(&mut Cpu::default(), &plan, &pair, true);
-    // 14 rows of dependency messages in a buffer; 57, of which 7 can be bound.
+    // 14 rows of dependency messages per buffer; then 57 rows, 7 of them per binding.
     for (buffer, binding) in [(1 << 19, 1 << 19), (1 << 21, 1 << 18)] {
         let faults =
             FaultInjection { max_buffer: Some(buffer), max_binding: Some(binding), ..Default::default() };
@@ -126,7 +126,7 @@ fn a_device_streams_in_small_buffers() {
 }
 
 #[test]
-fn a_device_that_may_take_enough_holds_all_rows() {
+fn a_device_with_enough_memory_holds_all_rows() {
     let Some(mut gpu) = devices::gpu() else { return };
     let mut random = Random::new(19);
     let pair = random::pair(&mut random, 64, 400);
@@ -140,7 +140,7 @@ fn a_device_that_may_take_enough_holds_all_rows() {
 }
 
 #[test]
-fn nothing_is_left_over_from_the_pair_before() {
+fn nothing_remains_of_the_pair_before() {
     let mut random = Random::new(18);
     let plan = plan((60, 330), -3, 40, &Method::default());
     assert!(!streamed(&plan).holds_all_rows());
@@ -154,9 +154,9 @@ fn nothing_is_left_over_from_the_pair_before() {
     }
 }
 
-/// Steps show all rows, and so need memory for them.
+/// Inspecting the steps needs memory for all rows.
 #[test]
-fn steps_are_declined_where_not_all_rows_fit() {
+fn inspection_is_refused_where_not_all_rows_fit() {
     let mut random = Random::new(22);
     let pair = random::pair(&mut random, 64, 400);
     let mib = |plan: &Plan| plan.bytes().div_ceil(1 << 20) as u32;
@@ -180,7 +180,7 @@ fn steps_are_declined_where_not_all_rows_fit() {
 }
 
 #[test]
-fn methods_that_look_at_the_whole_level_hold_all_rows() {
+fn methods_that_need_the_whole_level_hold_all_rows() {
     for preset in ["paper", "fgs"] {
         let plan = random::plan((60, 300), 0, 16, &Method::preset(preset).unwrap());
         assert!(streamed(&plan).holds_all_rows(), "{preset}");

@@ -1,4 +1,4 @@
-//! Which threads work, and how many.
+//! The threads that do the work, and their number.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -9,14 +9,14 @@ use mrfgs::rectification::{Options, Rectification};
 use mrfgs::{Matcher, SharedMatcher, calibration, threads};
 use std::path::Path;
 
-/// Whether somebody has begun the pool that all of a process has: the process that is forked from it would wait for that for ever.
+/// Whether rayon's global pool has been started. A forked process would wait for its threads for ever.
 fn global_pool_has_begun() -> bool {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().is_err()
 }
 
-/// All that is shared among threads is done by threads that are made anew in a process that is forked, and `limit` holds for it.
+/// All parallel work runs on threads that a forked process creates anew, and `limit` applies to it.
 #[test]
-fn nothing_begins_the_global_pool() {
+fn nothing_starts_the_global_pool() {
     threads::limit(2);
     let on = || threads::run(rayon::current_num_threads);
     assert_eq!((on(), threads::count()), (2, 2));
@@ -43,10 +43,10 @@ fn nothing_begins_the_global_pool() {
     assert_eq!(shared.share(&rectified, rayon::current_num_threads).unwrap(), 1);
     let again = shared.turn(|matcher| matcher.run(&rectified, found.range())).unwrap();
     assert_eq!((again.maps, again.ran_on), (found.maps, "the CPU path, 1 thread".into()));
-    // Whoever has a pool of its own keeps it.
+    // A caller's own pool is kept.
     let own = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
     assert_eq!(own.install(on), 3);
     assert!(!global_pool_has_begun());
-    // Control: it would be seen.
+    // Control: a started pool is detected.
     assert!(global_pool_has_begun());
 }

@@ -1,4 +1,4 @@
-//! Matches in tiles: how an image is split, and the effect on its maps.
+//! Tiled matching: how an image is split, and the effect on its maps.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -25,14 +25,14 @@ fn quiet(_: Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// The plan of `method` with this many MiB of memory.
+/// The plan of `method` with `memory` MiB.
 fn plan((width, height): (usize, usize), range: DisparityRange, method: &Method, memory: u32) -> Plan {
     let mut method = method.clone();
     method.tiles.memory = memory;
     Plan::new(width, height, range, &method).unwrap()
 }
 
-/// Checks the invariants of the tiles of `plan`, which have an overlap of `overlap`.
+/// Checks the invariants of `tiles`, which overlap by `overlap` pixels.
 fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
     let whole = tiles.whole();
     let ((width, height), range) = (whole.size(), whole.range);
@@ -50,7 +50,7 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
         }
         ensure(crop.x.end <= width && crop.y.end <= height, "crops inside the image")?;
         ensure(crop.x.start % grid == 0 && crop.y.start % grid == 0, "crops on the pyramid's grid")?;
-        // As far as the image extends.
+        // Within the image, a crop holds its core and this much on either side.
         let holds = |crop: &Range<usize>, core: &Range<usize>, before: i64, after: i64, length: usize| {
             let (first, last) = (core.start as i64 - before, core.end as i64 + after);
             crop.start as i64 <= first.max(0) && crop.end as i64 >= last.min(length as i64)
@@ -60,7 +60,7 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
         ensure(holds(&crop.y, &core.y, overlap, overlap, height), "the overlap above and below")?;
         ensure(holds(&crop.x, &core.x, overlap + left, overlap + right, width), "overlap and matches")?;
         ensure(bytes(&tile.plan) <= memory, "each tile within the memory")?;
-        // Of a pair that is matched at half its size, a crop has twice the size of what is matched.
+        // At half size, a crop of the pair is twice as large as the crop that is matched.
         let scale = if whole.full.is_some() { 2 } else { 1 };
         let of_pair = whole.of_pair();
         let in_one_piece = tiles.count() == 1;
@@ -75,7 +75,7 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
             expected.memory -= beside as u32;
             ensure(bytes(&tile.plan) <= u64::from(expected.memory + 1) << 20, "what is left of it")?;
         }
-        // Without an overlap a crop may be too small for all levels.
+        // Without overlap a crop may be too small for all levels.
         ensure(overlap == 0 || tile.plan == expected, "the plan of the crop")?;
     }
     ensure(covered.data().iter().all(|&n| n == 1), "every pixel in one core")?;
@@ -84,7 +84,7 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
 }
 
 #[test]
-fn cores_share_out_the_image_and_crops_hold_what_they_need() {
+fn cores_partition_the_image_and_crops_hold_what_they_need() {
     let mut random = Random::new(1);
     let (mut cut, mut refused, mut wide) = (0, 0, 0);
     for seed in 0..3000 {
@@ -110,7 +110,7 @@ fn cores_share_out_the_image_and_crops_hold_what_they_need() {
             }
             Err(error) => {
                 refused += 1;
-                // The memory that the error asks for is enough, and no less is.
+                // The memory in the error is the least that is enough.
                 let Error::Budget(BudgetError::NoTileFits { needed, .. }) = error else { panic!("{error}") };
                 let needed = u32::try_from(needed).unwrap();
                 assert!(needed > method.tiles.memory, "{error}");
@@ -127,10 +127,9 @@ fn cores_share_out_the_image_and_crops_hold_what_they_need() {
     );
 }
 
-/// Controls: the check detects a crop without its overlap or its matches, and cores that overlap or are off
-/// the grid.
+/// Controls: the check detects crops without overlap.
 #[test]
-fn wrong_tiles_are_seen() {
+fn wrong_tiles_are_noticed() {
     let range = DisparityRange::new(-20, 63).unwrap();
     let plan = plan((900, 700), range, &Method::default(), 128);
     let tiles = Tiles::new(&plan).unwrap();
@@ -143,8 +142,7 @@ fn wrong_tiles_are_seen() {
 
 #[test]
 fn the_shape_with_the_fewest_cropped_pixels_is_taken() {
-    // With hardly any labels to the left, tiles are as square as the image allows; with many, they are full
-    // rows.
+    // With few labels, tiles are as square as the image allows; with many, they are full rows.
     for (max, rows) in [(0, false), (1500, true)] {
         let plan = plan((2000, 2000), DisparityRange::new(max - 15, max).unwrap(), &Method::default(), 400);
         let tiles = Tiles::new(&plan).unwrap();
@@ -163,7 +161,7 @@ fn in_tiles(backend: &mut dyn Backend, tiles: &Tiles, pair: &Pair) -> Solution {
     common::solve_tiles(backend, tiles, pair, &mut quiet).unwrap()
 }
 
-/// Percentage of pixels that have a disparity in only one of the maps, or disparities more than one pixel
+/// The percentage of pixels that have a disparity in only one of the maps, or disparities more than 1 px
 /// apart.
 fn difference(a: &Maps, b: &Maps) -> f64 {
     let pixels = a.disparity.data().iter().zip(b.disparity.data());
@@ -175,10 +173,10 @@ fn difference(a: &Maps, b: &Maps) -> f64 {
 }
 
 #[test]
-fn every_backend_leaves_the_same_maps() {
+fn every_backend_gives_the_same_maps() {
     let Some(mut gpu) = devices::gpu() else { return };
     let (pair, range) = load(Path::new("testdata/thin"));
-    // At other sizes there are other tiles; `double_size.rs` and `half_size.rs` have tests of these.
+    // `double_size.rs` and `half_size.rs` test tiles at the other sizes.
     for preset in PRESETS.iter().filter(|preset| preset.method().schedule.match_size == MatchSize::Full) {
         let (preset, method) = (preset.name, preset.method());
         let whole = plan(pair.size(), range, &method, 4096);
@@ -187,7 +185,7 @@ fn every_backend_leaves_the_same_maps() {
         assert!(tiles.count() > 1, "{preset}");
         let memory = u64::from(plan.method.tiles.memory) << 20;
         let expected = in_tiles(&mut Cpu::default(), &tiles, &pair);
-        // By the default twice, the second time in the buffers of the first.
+        // The default preset runs twice, the second time in the buffers of the first.
         for _ in 0..if preset == "default" { 2 } else { 1 } {
             let actual = in_tiles(&mut gpu, &tiles, &pair);
             assert!(actual.maps == expected.maps && actual.iterations == expected.iterations, "{preset}");
@@ -200,9 +198,9 @@ fn every_backend_leaves_the_same_maps() {
     }
 }
 
-/// Scenes and real pairs in tiles: hardly any pixel changes, while without an overlap some do.
+/// Scenes and real pairs in tiles: few pixels change, and more without overlap.
 #[test]
-fn hardly_anything_differs_from_one_piece() {
+fn tiling_changes_few_pixels() {
     let mut folders: Vec<_> = std::fs::read_dir("testdata").unwrap().map(|e| e.unwrap().path()).collect();
     if let Ok(folder) = std::env::var("MRFGS_MIDDLEBURY") {
         folders.extend(std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()));
@@ -216,7 +214,7 @@ fn hardly_anything_differs_from_one_piece() {
         let whole = plan(pair.size(), range, &Method::default(), 4096);
         let expected = common::solve(&mut cpu, &whole, &pair, &mut quiet).unwrap();
         for (quarters, overlap) in [(3, OVERLAP), (2, OVERLAP), (2, 0)] {
-            // Plain walls are estimated from their borders, however far these are.
+            // Plain walls are estimated from their borders, however distant.
             let is_plain = ["wall", "poster", "corridor"].iter().any(|name| folder.ends_with(name));
             let most = match quarters {
                 _ if is_plain => 0.5,
@@ -242,7 +240,7 @@ fn hardly_anything_differs_from_one_piece() {
 }
 
 #[test]
-fn progress_names_the_tiles_and_goes_over_all_of_them() {
+fn progress_names_the_tiles_and_covers_all_of_them() {
     let (pair, range) = load(Path::new("testdata/slanted"));
     for left_right_check in [LeftRightCheck::RightView, LeftRightCheck::SecondMatch] {
         let mut method = Method::default();
@@ -261,7 +259,7 @@ fn progress_names_the_tiles_and_goes_over_all_of_them() {
         let mut named: Vec<_> = seen.iter().filter_map(|p| p.tile).collect();
         named.dedup();
         assert_eq!(named, (1..=count).map(|tile| (tile, count)).collect::<Vec<_>>());
-        // It stops wherever the observer breaks.
+        // Matching stops when the observer breaks.
         let stop = |p: Progress| if p.tile == Some((2, count)) { ControlFlow::Break(()) } else { quiet(p) };
         let stopped = common::solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut { stop });
         assert!(matches!(stopped, Err(Error::Interrupted)));
@@ -269,7 +267,7 @@ fn progress_names_the_tiles_and_goes_over_all_of_them() {
 }
 
 #[test]
-fn the_matcher_cuts_what_its_method_says() {
+fn the_matcher_splits_by_the_memory_of_the_method() {
     let (pair, range) = load(Path::new("testdata/thin"));
     let mut matcher = Matcher::builder().device("cpu").timings(true).build().unwrap();
     for (memory, tiled) in [(4096, false), (12, true)] {

@@ -1,4 +1,4 @@
-//! Pairs without a calibration: what two turned cameras see of a rendered scene, rectified by matches of the pair alone.
+//! Uncalibrated pairs: a rendered scene seen by two rotated cameras is rectified by sparse matches of the pair alone.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -15,10 +15,10 @@ use mrfgs::{Error, Matcher, check};
 use raw::{Camera, Lens, Matrix, SCALE, SIZE};
 use scenes::Scene;
 
-/// A focal length with which turned cameras still see the scene alone.
+/// A focal length at which rotated cameras still see nothing but the scene.
 const FOCAL: f64 = 240.0;
 
-/// A camera of a phone, which looks along the axis of the scene but for a `turn`.
+/// A phone camera that looks along the axis of the scene, apart from a rotation `turn`.
 fn phone(turn: Matrix, (width, height): (usize, usize)) -> Camera {
     let centre = [(width - 1) as f64 / 2.0, (height - 1) as f64 / 2.0];
     Camera { focal: FOCAL, centre, lens: Lens::RadialTangential([0.0; 5]), turn }
@@ -38,7 +38,7 @@ fn photographs(cameras: &[Camera; 2], size: (usize, usize), views: [&Plane<[u8; 
     Pair::new(left, right).unwrap()
 }
 
-/// Where the right camera sees what the left one has at a pixel, by the truth of the scene.
+/// The position in the right image of the scene point that the left image shows at a pixel.
 fn seen_by_right([left, right]: &[Camera; 2], scene: &Scene, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     let ray = [(x - left.centre[0]) / left.focal, (y - left.centre[1]) / left.focal, 1.0];
     let ray = raw::turned(&raw::inverse(&left.turn), ray);
@@ -53,7 +53,7 @@ fn seen_by_right([left, right]: &[Camera; 2], scene: &Scene, [x, y]: [f64; 2]) -
     Some(right.project(raw::turned(&right.turn, [px - baseline, py, pz])))
 }
 
-/// The pixel of the rectified right view that shows a pixel of its image, by Newton's method.
+/// The pixel of the rectified right view that shows a pixel of the right image, found by Newton's method.
 fn rectified_right(by: &Rectification, pixel: [f64; 2]) -> [f64; 2] {
     let mut at = pixel;
     for _ in 0..8 {
@@ -68,16 +68,16 @@ fn rectified_right(by: &Rectification, pixel: [f64; 2]) -> [f64; 2] {
     at
 }
 
-/// What is found of a pair, over the pixels whose truth is known and that both images have.
-struct Found {
-    /// How far the truth is off the row: the 99th percentile, in pixels.
+/// The errors of a pair, over the pixels with a known truth inside both images.
+struct Errors {
+    /// The 99th percentile of the vertical offset of the truth, in pixels.
     rows: f64,
-    /// The average error of the map, in pixels.
+    /// The mean error of the disparities, in pixels.
     error: f64,
 }
 
-/// The pair is matched; `truth` is where the right view has a pixel of the left one.
-fn measured(pair: &Pair, truth: impl Fn(usize, usize) -> Option<[f64; 2]>) -> Found {
+/// Matches the pair. `truth` gives the position in the right view of each pixel of the left view.
+fn measured(pair: &Pair, truth: impl Fn(usize, usize) -> Option<[f64; 2]>) -> Errors {
     let range = check::range(pair).unwrap_or(DisparityRange::new(0, 60).unwrap());
     let mut matcher = Matcher::builder().device("cpu").build().unwrap();
     let map = matcher.run(pair, range).unwrap().disparity();
@@ -94,11 +94,11 @@ fn measured(pair: &Pair, truth: impl Fn(usize, usize) -> Option<[f64; 2]>) -> Fo
     }
     assert!(errors.len() > width * height / 2, "{} of {width} x {height}", errors.len());
     rows.sort_unstable_by(f64::total_cmp);
-    Found { rows: rows[rows.len() * 99 / 100], error: errors.iter().sum::<f64>() / errors.len() as f64 }
+    Errors { rows: rows[rows.len() * 99 / 100], error: errors.iter().sum::<f64>() / errors.len() as f64 }
 }
 
-/// The pair of cameras that are not turned: it is rectified.
-fn perfect(scene: &Scene) -> Found {
+/// The errors of the pair taken without rotation, which is rectified.
+fn perfect(scene: &Scene) -> Errors {
     let cameras = [phone(degrees([0.0; 3]), SIZE); 2];
     let pair = photographs(&cameras, SIZE, [&scene.left, &scene.right]);
     measured(&pair, |x, y| seen_by_right(&cameras, scene, [x as f64, y as f64]))
@@ -108,7 +108,7 @@ fn by_matches(pair: &Pair) -> Rectification {
     Rectification::of_pair(pair, &Options::default()).unwrap()
 }
 
-/// How hands may turn two photographs, in degrees.
+/// Rotations of hand-held photographs, in degrees.
 const HANDS: [(&str, [[f64; 3]; 2]); 4] = [
     ("a little", [[0.5, -0.4, 0.8], [-0.6, 0.3, -0.5]]),
     ("up and aside", [[2.0, -2.5, 1.0], [-2.0, 2.0, -1.5]]),
@@ -146,7 +146,7 @@ fn a_hand_held_pair_is_rectified_by_its_matches() {
             );
             assert!(by.calibration().is_err(), "there is no scale");
 
-            // Control: as they were taken, they are matched far worse.
+            // Control: unrectified photographs are matched far worse.
             if hands == "up and aside" {
                 let crooked = measured(&pair, |x, y| seen_by_right(&cameras, &scene, [x as f64, y as f64]));
                 assert!(crooked.rows > 5.0 && crooked.error > reference.error + 1.0, "{}", crooked.error);
@@ -155,13 +155,13 @@ fn a_hand_held_pair_is_rectified_by_its_matches() {
     }
 }
 
-/// A roll of 20 degrees between the photographs is found by turning one of them.
+/// A roll of 20 degrees between the photographs is found by rotating one of them.
 #[test]
-fn photographs_may_be_rolled_far() {
+fn photographs_may_have_a_large_roll() {
     let scene = scene("slanted");
     let cameras = [[1.0, -2.0, 9.0], [-1.0, 1.0, -11.0]].map(|turn| phone(degrees(turn), SIZE));
     let pair = photographs(&cameras, SIZE, [&scene.left, &scene.right]);
-    // As they are they show no range; what the error says is so.
+    // Unrectified they give no range, and the error names the reason.
     assert_eq!(check::range(&pair), Err(RangeError::NotRectified.into()));
     let by = by_matches(&pair);
     let range = check::range(&by.apply(&pair).unwrap()).unwrap();
@@ -179,7 +179,7 @@ fn photographs_may_be_rolled_far() {
     assert!(rows.len() > 500 && most <= 0.3, "{most}");
 }
 
-/// One photograph above the other: both are turned by a quarter.
+/// With one photograph above the other, both are rotated by a quarter turn.
 #[test]
 fn photographs_may_be_one_above_the_other() {
     let scene = scene("slanted");
@@ -201,7 +201,7 @@ fn photographs_may_be_one_above_the_other() {
     }
 }
 
-/// Every number of threads gives the same bits, and so does every machine.
+/// The rectification has the same bits with every number of threads and on every machine.
 #[test]
 fn the_bits_are_the_same_everywhere() {
     let pair = Pair::open("testdata/raw/left.png", "testdata/raw/right.png").unwrap();
@@ -242,16 +242,15 @@ fn pairs_that_show_no_geometry_are_refused() {
     assert!(matches!(refused(&photographs(&scene.left, &other.right)), RectificationError::Few { .. }));
     assert!(matches!(refused(&plain), RectificationError::Few { .. }));
     assert_eq!(refused(&same), RectificationError::Flat);
-    // A camera that turned on the spot.
+    // A camera rotated on the spot, without baseline.
     assert_eq!(refused(&photographs(&scene.left, &scene.left)), RectificationError::Flat);
     assert_eq!(refused(&forward(&[&scene.left, &other.left], 0.06)), RectificationError::Forward);
-    // Of one pixel there is nothing.
     let dot = Plane::filled(1, 1, [9; 3]);
     let dot = Pair::new(Image::from_rgb8(&dot), Image::from_rgb8(&dot)).unwrap();
     assert!(matches!(refused(&dot), RectificationError::Few { .. }));
 }
 
-/// A wall with two pictures in front of it, from a camera that goes forward by `step` of the distance to the wall.
+/// A wall with two pictures in front, from a camera that moves forward by `step` of the distance to the wall.
 fn forward(views: &[&Plane<[u8; 3]>; 2], step: f64) -> Pair {
     let photograph = |step: f64| {
         Image::from_rgb8(&Plane::from_fn(SIZE.0, SIZE.1, |x, y| {
@@ -261,7 +260,7 @@ fn forward(views: &[&Plane<[u8; 3]>; 2], step: f64) -> Pair {
             let is_near = (0.05..0.2).contains(&near[0].abs()) && near[1].abs() < 0.12;
             let ([u, v], view) =
                 if is_near { (near.map(|v| v / 0.6), views[1]) } else { (shown(1.0), views[0]) };
-            // The mean of the pixels around.
+            // The weighted mean of the surrounding pixels.
             let (u, v) = (360.0 + 640.0 * u, 270.0 + 640.0 * v);
             let (mut sum, mut all) = ([0.0; 3], 0.0);
             for (dx, dy) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))) {
@@ -277,7 +276,7 @@ fn forward(views: &[&Plane<[u8; 3]>; 2], step: f64) -> Pair {
     Pair::new(photograph(0.0), photograph(step)).unwrap()
 }
 
-/// What two phones see of points in space, the second one `moved`, and turned.
+/// The projections of points into two phones, the second one moved by `moved` and rotated.
 fn correspondences(moved: [f64; 3], depth: impl Fn(usize) -> f64) -> Vec<Correspondence> {
     let cameras = [[1.0, -0.5, 1.0], [-1.5, 0.5, -0.5]].map(|turn| phone(degrees(turn), SIZE));
     let grid =
@@ -293,14 +292,14 @@ fn correspondences(moved: [f64; 3], depth: impl Fn(usize) -> f64) -> Vec<Corresp
 }
 
 #[test]
-fn exact_matches_give_exact_rows() {
+fn exact_matches_give_an_exact_rectification() {
     let of = |matches: &[Correspondence]| Rectification::of_matches(matches, SIZE, &Options::default());
     let depth = |i: usize| 2.0 + (i * 7 % 11) as f64 / 4.0;
     let sound = correspondences([0.2, 0.02, -0.03], depth);
     let trust = *of(&sound).unwrap().trust().unwrap();
     println!("{trust}");
     assert!(trust.agreeing == sound.len() && trust.percentile95 < 0.05, "{trust}");
-    // A third of them is wrong.
+    // A third of the matches is wrong.
     let wrong: Vec<_> = sound
         .iter()
         .enumerate()

@@ -1,6 +1,5 @@
-//! Warnings about a pair or a match that is probably wrong: always on rendered scenes, and on real pairs
-//! where `MRFGS_MIDDLEBURY` names their folder. A sound pair gets none, and each defect is detected once it
-//! is made.
+//! Warnings about a pair or a match that is probably wrong, on rendered scenes and, where `MRFGS_MIDDLEBURY`
+//! names their folder, on real pairs. Sound pairs get none, and each injected defect is detected.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -10,7 +9,7 @@ use mrfgs::low_level::engine::Inspection;
 use mrfgs::low_level::front::check::{self, Part, Warning};
 use mrfgs::maps::{FRACTION, Maps};
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::{Found, Matched, Matcher};
+use mrfgs::{AutoRange, Matched, Matcher};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -41,7 +40,7 @@ impl Case {
         Self::load(&Path::new("testdata").join(name))
     }
 
-    /// The true disparity that `percent` of the pixels are below.
+    /// The true disparity below which `percent` of the pixels lie.
     fn truth(&self, percent: usize) -> f32 {
         self.truths[(self.truths.len() - 1) * percent / 100]
     }
@@ -56,7 +55,7 @@ impl Case {
         check::warnings(&self.exposure(change), Some(self.range))
     }
 
-    /// The pair where the right view has `change` applied to each 8-bit level.
+    /// The pair with `change` applied to each 8-bit level of the right view.
     fn exposure(&self, change: impl Fn(f64) -> f64) -> Pair {
         let right = self.pair.right();
         let level = |v: u16| (change(f64::from(v >> 8)).round().clamp(0.0, 255.0) as u16) << 8;
@@ -69,7 +68,7 @@ impl Case {
     }
 }
 
-/// The scenes whose views are moved, turned and exchanged.
+/// The scenes whose views are shifted, rotated and exchanged.
 const SCENES: [&str; 6] = ["slanted", "thin", "wall", "repetitive", "exposure", "mixed"];
 
 /// All scenes, and all available real pairs.
@@ -103,11 +102,11 @@ fn moved(image: &Image, from: impl Fn(i32, i32) -> (i32, i32)) -> Image {
 }
 
 #[test]
-fn nothing_is_said_where_nothing_is_wrong() {
+fn sound_pairs_get_no_warning() {
     for case in cases() {
         assert_eq!(check::warnings(&case.pair, Some(case.range)), [], "{}", case.name);
         assert_eq!(check::warnings_of(&case.maps(case.range), case.range), [], "{}", case.name);
-        // A little darker or brighter does no harm.
+        // A small change of brightness is harmless.
         for (gain, offset) in [(0.72, 14.0), (0.5, 0.0), (1.0, 20.0), (1.0, -20.0)] {
             assert_eq!(case.exposed(|v| gain * v + offset), [], "{}, {gain} {offset}", case.name);
         }
@@ -115,7 +114,7 @@ fn nothing_is_said_where_nothing_is_wrong() {
 }
 
 #[test]
-fn exposures_far_apart_are_told() {
+fn different_exposures_are_warned_about() {
     for case in cases() {
         let dark = case.exposed(|v| v * 0.15);
         assert!(
@@ -131,7 +130,7 @@ fn exposures_far_apart_are_told() {
 }
 
 #[test]
-fn a_view_of_one_colour_is_told() {
+fn a_view_of_one_colour_is_warned_about() {
     let case = Case::scene("mixed");
     let (width, height) = case.pair.size();
     let noise = |x: usize, y: usize| ((x * x * 31 + y * y * 17 + x * y * 13) % 3) as u8;
@@ -142,7 +141,7 @@ fn a_view_of_one_colour_is_told() {
     assert_eq!(told(&plain, case.pair.right()), [is_plain("left")]);
     assert_eq!(told(case.pair.left(), &plain), [is_plain("right")]);
     assert_eq!(told(&plain, &plain), [is_plain("left"), is_plain("right")]);
-    // Masked pixels have no colour; where all are masked, there is no warning.
+    // Masked pixels are ignored; a view that is masked completely has a warning of its own.
     let mut mostly = case.pair.left().clone();
     for y in 0..height {
         for x in 0..width {
@@ -159,9 +158,9 @@ fn a_view_of_one_colour_is_told() {
     assert_eq!(told(case.pair.left(), &mostly), [Warning::Masked { view: "right" }]);
 }
 
-/// Views that do not belong together have a full map all the same, so it must say what it is worth.
+/// Views that do not belong together still give a dense map, so a warning must say that it is worthless.
 #[test]
-fn views_that_hardly_match_are_told() {
+fn views_that_hardly_match_are_warned_about() {
     let scene = |name: &str| Case::scene(name).pair;
     let (slanted, mixed, thin) = (scene("slanted"), scene("mixed"), scene("thin"));
     let inverted = |image: &Image| Image {
@@ -192,7 +191,7 @@ fn views_that_hardly_match_are_told() {
                 "{what}: {warnings:?}"
             );
         }
-        // Controls.
+        // Controls: sound pairs, and one that is masked completely.
         assert_eq!(told(&slanted), []);
         assert_eq!(told(&mixed), []);
         let mut masked = mixed.left().clone();
@@ -201,32 +200,32 @@ fn views_that_hardly_match_are_told() {
     }
 }
 
-/// A range that sparse matches found and that cuts off the scene becomes wider; one that a user gave stays.
+/// An automatic range that clips the scene is widened, and a range given by a user is kept.
 #[test]
-fn a_range_that_was_found_becomes_wider() {
+fn an_automatic_range_is_widened() {
     let case = Case::scene("mixed");
     for method in [Method::default(), Method::fast()] {
         let mut matcher = Matcher::builder().method(method).device("cpu").build().unwrap();
         let cut = DisparityRange::new(0, 25).unwrap();
-        let again = matcher.run(&case.pair, Found(cut)).unwrap();
+        let again = matcher.run(&case.pair, AutoRange(cut)).unwrap();
         assert_eq!((again.range().min, again.range().max, again.range_found), (0, 38, true));
         let wider = matcher.run(&case.pair, 0..=38).unwrap();
         assert!(again.maps == wider.maps && !wider.range_found);
         let given = matcher.run(&case.pair, cut).unwrap();
         assert!(given.range() == cut && !given.warnings().is_empty());
-        // A range that holds the scene stays, and so does one beyond which nothing is found.
-        let enough = matcher.run(&case.pair, Found(case.range)).unwrap();
+        // A range that holds the scene is kept.
+        let enough = matcher.run(&case.pair, AutoRange(case.range)).unwrap();
         assert_eq!(enough.range(), case.range);
-        // The lower end of a range that was found does not count: what is far away has matches.
+        // The lower end of an automatic range does not count, because distant points have sparse matches.
         let high = DisparityRange::new(22, 47).unwrap();
         let lower = |found: &Matched| {
             found.warnings().iter().any(|w| matches!(w, Warning::Clipped { upper: false, .. }))
         };
         assert!(lower(&matcher.run(&case.pair, high).unwrap()));
-        assert!(!lower(&matcher.run(&case.pair, Found(high)).unwrap()));
-        // Who looks in sees one match.
+        assert!(!lower(&matcher.run(&case.pair, AutoRange(high)).unwrap()));
+        // An inspected job runs one match, without widening.
         let mut prepared = 0;
-        let job = matcher.job(&case.pair, Found(cut)).inspect(|seen| {
+        let job = matcher.job(&case.pair, AutoRange(cut)).inspect(|seen| {
             prepared += usize::from(matches!(seen, Inspection::Prepared(_)));
             Ok(())
         });
@@ -235,9 +234,9 @@ fn a_range_that_was_found_becomes_wider() {
 }
 
 #[test]
-fn a_range_that_cuts_off_the_scene_is_told() {
+fn a_range_that_clips_the_scene_is_warned_about() {
     for case in cases() {
-        // A tenth or a third of the truth is beyond the end; some surfaces end just there.
+        // The range excludes a tenth or a third of the true disparities; some surfaces end just there.
         let told = |range: DisparityRange| check::warnings_of(&case.maps(range), range);
         let ends = |warnings: &[Warning], at_top: bool| {
             warnings.iter().any(|w| matches!(w, Warning::Clipped { upper, .. } if *upper == at_top))
@@ -251,7 +250,7 @@ fn a_range_that_cuts_off_the_scene_is_told() {
         });
         assert!(cut.iter().any(|warnings| ends(warnings, false)), "{}: {cut:?}", case.name);
     }
-    // Matched at half the size, disparities are kept in the range at the end.
+    // Matching at half size clamps disparities to the range.
     let case = Case::scene("mixed");
     let mut matcher = Matcher::builder().method(Method::fast()).device("cpu").build().unwrap();
     let mut told = |max: i32| {
@@ -264,7 +263,7 @@ fn a_range_that_cuts_off_the_scene_is_told() {
     };
     assert!(matches!(told(20)[..], [Warning::Clipped { end: 20, upper: true, percent: 20..35 }]));
     assert_eq!(told(case.range.max), []);
-    // 0 is the horizon and not an end; ranges that consist only of ends get no warning.
+    // A lower end of 0 is the horizon and clips nothing; ranges of a single label get no warning.
     let case = Case::scene("mixed");
     let mut maps = case.maps(case.range);
     maps.raw = Plane::filled(case.pair.size().0, case.pair.size().1, 0);
@@ -275,7 +274,7 @@ fn a_range_that_cuts_off_the_scene_is_told() {
 }
 
 #[test]
-fn pairs_that_are_not_rectified_are_told() {
+fn unrectified_pairs_are_warned_about() {
     for case in cases_of(&SCENES) {
         assert_eq!(check::warnings(&case.pair, None), [], "{}", case.name);
         for rows in [1, -1, 2, -5] {
@@ -287,7 +286,7 @@ fn pairs_that_are_not_rectified_are_told() {
             };
             assert!(offset.abs_diff(rows.unsigned_abs() * 256) < 100, "{}, {rows} rows: {offset}", case.name);
         }
-        // A slight rotation: there is no common offset, and the rows still do not match.
+        // A slight rotation: without a common offset, the rows still do not match.
         let width = case.pair.size().0 as i32;
         let right = moved(case.pair.right(), |x, y| (x, y - (x - width / 2) * 12 / width));
         let pair = Pair::new(case.pair.left().clone(), right).unwrap();
@@ -297,7 +296,7 @@ fn pairs_that_are_not_rectified_are_told() {
 }
 
 #[test]
-fn views_that_are_turned_are_told() {
+fn turned_views_are_warned_about() {
     for case in cases_of(&SCENES) {
         let (left, right) = (case.pair.left(), case.pair.right());
         for (how, turned) in [
@@ -310,12 +309,12 @@ fn views_that_are_turned_are_told() {
                 assert_eq!(check::warnings(&pair, range), [Warning::Turned { how }], "{}", case.name);
             }
         }
-        // Either view; and both turned together are an ordinary pair.
+        // Turning the left view alone is detected, and turning both gives an ordinary pair.
         let pair = Pair::new(left.flipped(), right.clone()).unwrap();
         assert_eq!(check::warnings(&pair, None), [Warning::Turned { how: "upside down" }], "{}", case.name);
         let pair = Pair::new(left.flipped(), right.flipped()).unwrap();
         assert_eq!(check::warnings(&pair, Some(case.range)), [], "{}", case.name);
-        // Turned by a quarter, either way, rows are columns.
+        // In pairs turned by a quarter, rows are columns.
         for turned in [Image::flipped, Image::mirrored] {
             let pair = Pair::new(turned(&left.transposed()), turned(&right.transposed())).unwrap();
             assert_eq!(check::warnings(&pair, None), [Warning::Sideways], "{}", case.name);
@@ -330,9 +329,9 @@ fn views_that_are_turned_are_told() {
     }
 }
 
-/// Where matches find no range because of a mistake that has a name, the error has it.
+/// If a known mistake explains why no range was found, the error names it.
 #[test]
-fn a_range_that_is_not_found_says_why() {
+fn a_missing_range_is_explained() {
     let mut refused = [0; 2];
     for case in SCENES.map(Case::scene) {
         let (left, right) = (case.pair.left(), case.pair.right());
@@ -341,7 +340,7 @@ fn a_range_that_is_not_found_says_why() {
         for (i, (pair, words)) in
             [(mirrored, "is mirrored"), (sideways, "on the same column")].into_iter().enumerate()
         {
-            // A few have enough false matches for a range.
+            // Some scenes have enough false matches for a range.
             if let Err(error) = check::range(&pair.unwrap()) {
                 assert!(error.to_string().contains(words), "{}: {error}", case.name);
                 refused[i] += 1;
@@ -349,7 +348,7 @@ fn a_range_that_is_not_found_says_why() {
         }
     }
     assert!(refused.iter().all(|count| *count >= 3), "{refused:?}");
-    // A range helps where the views can be matched after all.
+    // Low contrast is not named as the cause, because a given range may still match such views.
     let (case, other) = (Case::scene("slanted"), Case::scene("thin"));
     let strangers =
         Case { pair: Pair::new(case.pair.left().clone(), other.pair.right().clone()).unwrap(), ..case };
@@ -360,36 +359,36 @@ fn a_range_that_is_not_found_says_why() {
 }
 
 #[test]
-fn swapped_views_are_told() {
+fn swapped_views_are_warned_about() {
     for case in SCENES.map(Case::scene) {
         let swapped = Pair::new(case.pair.right().clone(), case.pair.left().clone()).unwrap();
         for range in [None, Some(case.range)] {
             let warnings = check::warnings(&swapped, range);
             assert!(matches!(warnings[..], [Warning::Swapped { .. }]), "{}: {warnings:?}", case.name);
         }
-        // A user who asks for negative disparities is not warned.
+        // A range of negative disparities expects this order, so there is no warning.
         let negative = DisparityRange::new(-31, 0).unwrap();
         assert_eq!(check::warnings(&swapped, Some(negative)), [], "{}", case.name);
     }
 }
 
-/// Where matches lie says nothing of the order while cameras are turned. Once the pair is rectified, it does.
+/// The order of the views can be told only once the rows match.
 #[test]
-fn views_that_are_not_rectified_may_be_in_order() {
+fn unrectified_views_may_be_in_order() {
     let mixed = Case::scene("mixed").pair;
     let aside = |image: &Image, (right, down): (i32, i32)| moved(image, |x, y| (x - right, y - down));
     let told = |left: &Image, right: Image| check::warnings(&Pair::new(left.clone(), right).unwrap(), None);
-    // The right camera looks to the left, so that all lies further right in its view.
+    // The right camera looks to the left, so everything lies further right in its view.
     let warnings = told(mixed.left(), aside(mixed.right(), (60, 3)));
     assert!(matches!(warnings[..], [Warning::NotRectified { .. }]), "{warnings:?}");
     let warnings = told(mixed.right(), aside(mixed.left(), (0, 3)));
     assert!(matches!(warnings[..], [Warning::NotRectified { .. }]), "{warnings:?}");
-    // Control: the rows are right, and the order is not.
+    // Control: the rows match, and the order is wrong.
     let warnings = told(mixed.right(), mixed.left().clone());
     assert!(matches!(warnings[..], [Warning::Swapped { .. }]), "{warnings:?}");
 }
 
-/// `image` with what `is_there` of it taken from `other`.
+/// `image`, with the pixels where `is_there` holds taken from `other`.
 fn mixed_with(image: &Image, other: &Image, is_there: impl Fn(usize, usize) -> bool) -> Image {
     let (width, height) = image.pixels.size();
     let from = |x, y| if is_there(x, y) { other } else { image };
@@ -399,7 +398,7 @@ fn mixed_with(image: &Image, other: &Image, is_there: impl Fn(usize, usize) -> b
     }
 }
 
-/// The means over squares of so many pixels beside, three times over: nearly a Gaussian.
+/// Three box filters in a row: nearly a Gaussian.
 fn blurred(image: &Image, radius: i32) -> Image {
     let mut planes: [Plane<f64>; 3] = std::array::from_fn(|i| image.pixels.map(|p| f64::from(p[i] >> 8)));
     let (width, height) = image.pixels.size();
@@ -422,12 +421,12 @@ fn blurred(image: &Image, radius: i32) -> Image {
     }))
 }
 
-/// Says which pixels are in a part of an image.
+/// Selects the pixels of a part of an image.
 type Pixels<'a> = &'a dyn Fn(usize, usize) -> bool;
 
-/// Of a view whose part is none, the rest has a good map. Faint texture alone, as on walls, is no doubt.
+/// A view with a defective part still gives a good map of the rest. Faint texture alone is no defect.
 #[test]
-fn parts_that_do_not_belong_are_told() {
+fn defective_parts_are_warned_about() {
     const SOUND: [&str; 15] = [
         "slanted",
         "thin",
@@ -455,7 +454,7 @@ fn parts_that_do_not_belong_are_told() {
         let (width, height) = pair.size();
         let of = if scene == "mixed" { other.right() } else { mixed.right() };
         let (w, h) = of.pixels.size();
-        // Another scene, of any size, and the same one further down.
+        // Another scene, tiled to this size, and the same scene shifted down.
         let strange = Plane::from_fn(width, height, |x, y| of.pixels[(x % w, y % h)]);
         let strange = Image { pixels: strange, ..right.clone() };
         let [much, little] = [20, 3].map(|rows| moved(right, |x, y| (x, y - rows)));
@@ -471,7 +470,7 @@ fn parts_that_do_not_belong_are_told() {
         let rows = |first: usize, last: usize| Part::Rows { first, last, of: height };
         let columns = |first: usize, last: usize| Part::Columns { first, last, of: width };
 
-        // A copy of the other view.
+        // A part copied from the other view.
         let copies: [(Part, Pixels); 4] = [
             (rows(0, height / 2 - 1), &|_, y| !half(y)),
             (rows(height / 2, height - 1), &|_, y| half(y)),
@@ -481,9 +480,9 @@ fn parts_that_do_not_belong_are_told() {
         for (part, is_there) in copies {
             assert_eq!(told(left, mixed_with(right, left, is_there)), Warning::Copied { part }, "{scene}");
         }
-        // Blur, of all and of a part, and nothing at all.
+        // Blur of the whole view or a part, and a part of one colour.
         let lacks = |view, part| Warning::Blurred { view, part };
-        // The uppermost rows of one scene are plain, which blur does not change.
+        // The uppermost rows of one scene are plain, so blur does not change them.
         let all = [Part::Whole, rows(height / 8, height - 1)];
         let is_all = |warning, view| all.iter().any(|part| warning == lacks(view, *part));
         assert!(is_all(told(left, blur.clone()), "right"), "{scene}");
@@ -496,7 +495,7 @@ fn parts_that_do_not_belong_are_told() {
                 "{scene}"
             );
         }
-        // Another scene, another place. (Where half is 3 rows off, the pair counts as not rectified.)
+        // A part of another scene, or moved down. (With half of it 3 rows off, the pair is not rectified.)
         for (what, with, top) in [
             ("scene", &strange, height / 2),
             ("20 rows", &much, height / 2),
@@ -508,20 +507,20 @@ fn parts_that_do_not_belong_are_told() {
             };
             assert!(first.abs_diff(top) < 20 && last + 20 > height, "{scene}, {what}: {torn:?}");
         }
-        // Of noise the other view lacks the detail.
+        // Where one view is noise, the other lacks its detail.
         let noisy = |image: &Image| mixed_with(image, &noise, |_, y| half(y));
         assert_eq!(told(left, noisy(right)), lacks("left", lower_half), "{scene}");
         assert_eq!(told(&noisy(left), right.clone()), lacks("right", lower_half), "{scene}");
-        // What is masked in the right view alone is no doubt.
+        // Masking a part of the right view alone causes no warning.
         let mut masked = right.clone();
         masked.masked = Plane::from_fn(width, height, |_, y| half(y));
         assert_eq!(check::warnings(&Pair::new(left.clone(), masked).unwrap(), None), [], "{scene}");
     }
 }
 
-/// A mask of one view takes what it covers from the statistics of both.
+/// Pixels masked in one view are excluded from the statistics of both.
 #[test]
-fn a_mask_is_no_doubt() {
+fn a_mask_causes_no_warning() {
     let mixed = Case::scene("mixed").pair;
     let (width, height) = mixed.size();
     let masked = |is_masked: &dyn Fn(usize, usize) -> bool| {
@@ -529,7 +528,7 @@ fn a_mask_is_no_doubt() {
         left.masked = Plane::from_fn(width, height, is_masked);
         Pair::new(left, mixed.right().clone()).unwrap()
     };
-    // The upper rows have little contrast, and the others much; without their mask, the same rows of both views are compared with all.
+    // The upper rows have little contrast and the others much, so ignoring the mask would compare different rows.
     let plain_rows = masked(&|_, y| y >= 20);
     assert_eq!(check::warnings(&plain_rows, None), []);
     let exposed = |gain: u16| {
@@ -540,7 +539,7 @@ fn a_mask_is_no_doubt() {
     };
     assert!(exposed(8).iter().any(|w| matches!(w, Warning::Contrast { .. })), "control: {:?}", exposed(8));
 
-    // What is left of a mask of 85 % is hardly found: at the left border, whose matches are outside, and of small islands.
+    // Most of what a mask of 85 % leaves is unmatched: at the left border, outside the right view, and on small islands.
     let mut matcher = Matcher::builder().method(Method::fast()).device("cpu").build().unwrap();
     let mut told = |pair: &Pair| matcher.run(pair, 0..=47).unwrap().warnings();
     for is_masked in [(|x, _| x >= 40) as fn(usize, usize) -> bool, |x, y| x % 25 >= 10 || y % 26 >= 10] {
@@ -554,16 +553,16 @@ fn a_mask_is_no_doubt() {
 }
 
 #[test]
-fn identical_images_are_told() {
+fn identical_images_are_warned_about() {
     let case = Case::scene("mixed");
     let left = case.pair.left();
     let mut other = left.clone();
     other.pixels[(9, 9)] = [1, 2, 3, 4];
     assert_eq!(check::warnings(&Pair::new(left.clone(), left.clone()).unwrap(), None), [Warning::Identical]);
-    // A pixel more or less makes no pair of them.
+    // A difference in one pixel still counts as a copy.
     let copied = [Warning::Copied { part: Part::Whole }];
     assert_eq!(check::warnings(&Pair::new(left.clone(), other.clone()).unwrap(), None), copied);
-    // A difference at a masked pixel does not count.
+    // A difference at a masked pixel is ignored.
     other.masked[(9, 9)] = true;
     assert_eq!(check::warnings(&Pair::new(left.clone(), other).unwrap(), None), [Warning::Identical]);
 }

@@ -3,9 +3,9 @@
 use mrfgs::Error;
 use mrfgs::check::Warning;
 use mrfgs::rectification::Doubt;
-use mrfgs::remedy::{self, Words};
+use mrfgs::remedy::{self, Vocabulary};
 
-const WORDS: Words = Words {
+const WORDS: Vocabulary = Vocabulary {
     key: ["option \"", "\""],
     min: "range.min",
     max: "range.max",
@@ -16,7 +16,7 @@ const WORDS: Words = Words {
     mask: Some("give alpha 0 to what is no image"),
     unit: Some("state the right one by mrfgs_calibration_unit()"),
     crop: Some("mrfgs_calibration_crop()"),
-    ..Words::PLAIN
+    ..Vocabulary::PLAIN
 };
 
 /// An error with its remedy.

@@ -53,7 +53,7 @@ impl Failure {
     }
 
     /// In one line, with what helps in these `words`.
-    pub(crate) fn message(&self, words: &remedy::Words) -> String {
+    pub(crate) fn message(&self, words: &remedy::Vocabulary) -> String {
         match self {
             Self::Usage(text) | Self::Failed(text) | Self::Stopped(text) => single_line(text),
             Self::Error(error) => single_line(&remedy::error(error, words)),

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use mrfgs::image::{Pair, Rect};
 use mrfgs::low_level::engine::Inspector;
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::{Found, Job, Matched, Matcher, check};
+use mrfgs::{AutoRange, Job, Matched, Matcher, check};
 
 use crate::console;
 use crate::failure::Result;
@@ -46,8 +46,11 @@ impl<'a> Searched<'a> {
 
     /// A match of `pair` over it.
     pub(crate) fn job<'b>(self, matcher: &'b mut Matcher, pair: &'b Pair) -> Job<'b> {
-        let job =
-            if self.may_widen { matcher.job(pair, Found(self.range)) } else { matcher.job(pair, self.range) };
+        let job = if self.may_widen {
+            matcher.job(pair, AutoRange(self.range))
+        } else {
+            matcher.job(pair, self.range)
+        };
         match self.region {
             Some(region) => job.region(region.clone()),
             None => job,

@@ -1,9 +1,9 @@
 //! The program's words for what helps: flags, and the columns of a list.
 
-pub(crate) use mrfgs::remedy::{Words, doubt, error, of_rectified, warning};
+pub(crate) use mrfgs::remedy::{Vocabulary, doubt, error, of_rectified, warning};
 
 /// On the command line.
-pub(crate) const FLAGS: Words = Words {
+pub(crate) const FLAGS: Vocabulary = Vocabulary {
     key: ["--set ", ""],
     keys: Some("`mrfgs presets` lists the keys"),
     preset: "--method",
@@ -25,16 +25,16 @@ pub(crate) const FLAGS: Words = Words {
     rectify: Some("--rectify (or `mrfgs rectify`)"),
     unit: Some("say the right one in the file by an entry `unit`: mm, cm or m"),
     crop: Some("--calib-crop"),
-    ..Words::PLAIN
+    ..Vocabulary::PLAIN
 };
 
 /// Of cameras that the command line gives by their numbers.
-pub(crate) const NUMBERS: Words =
-    Words { unit: Some("give the right one with the number, such as 120mm, 12cm or 0.12m"), ..FLAGS };
+pub(crate) const NUMBERS: Vocabulary =
+    Vocabulary { unit: Some("give the right one with the number, such as 120mm, 12cm or 0.12m"), ..FLAGS };
 
 /// In a list of pairs, where --rectify takes a calibration.
-pub(crate) const COLUMNS: Words =
-    Words { min: "min_disparity", max: "max_disparity", rectify: Some("`mrfgs rectify`"), ..FLAGS };
+pub(crate) const COLUMNS: Vocabulary =
+    Vocabulary { min: "min_disparity", max: "max_disparity", rectify: Some("`mrfgs rectify`"), ..FLAGS };
 
 #[cfg(test)]
 mod tests {

@@ -8,7 +8,7 @@ use std::thread;
 use mrfgs::image::Rect;
 use mrfgs::options::DisparityRange;
 use mrfgs::region::Region;
-use mrfgs::{Found, Matched, Matcher, Pair, SharedMatcher, check};
+use mrfgs::{AutoRange, Matched, Matcher, Pair, SharedMatcher, check};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -109,7 +109,7 @@ impl PyMatcher {
                 matcher.turn(|matcher| {
                     let job = match given {
                         Some(range) => matcher.job(&pair, range),
-                        None => matcher.job(&pair, Found(range)),
+                        None => matcher.job(&pair, AutoRange(range)),
                     };
                     let job = match &part {
                         Some(part) => job.region(part.part().clone()),

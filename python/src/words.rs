@@ -3,9 +3,9 @@
 use mrfgs::Error;
 use mrfgs::check::Warning;
 use mrfgs::rectification::Doubt;
-use mrfgs::remedy::{self, Words};
+use mrfgs::remedy::{self, Vocabulary};
 
-const WORDS: Words = Words {
+const WORDS: Vocabulary = Vocabulary {
     key: ["options[\"", "\"]"],
     min: "min_disparity",
     max: "max_disparity",
@@ -16,7 +16,7 @@ const WORDS: Words = Words {
     rectify: Some("Rectification.of_pair()"),
     unit: Some("state the right one by Calibration(..., unit=\"m\") or Rig.of(..., unit=\"m\")"),
     crop: Some("Calibration(..., crop=(x, y, width, height))"),
-    ..Words::PLAIN
+    ..Vocabulary::PLAIN
 };
 
 /// An error with its remedy.

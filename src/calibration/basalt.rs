@@ -1,4 +1,4 @@
-//! Basalt's calibration, in JSON: camera 0 is the left one, camera 1 the right one.
+//! Basalt's calibration in JSON: camera 0 is the left one, camera 1 the right one.
 
 use super::cameras::{Pose, StereoCalibration};
 use super::lens::{Distortion, Lens, RadialTangential};
@@ -8,7 +8,7 @@ use super::posed::{Posed, pair};
 use crate::error::Result;
 use crate::image::calib::Unit;
 
-/// Whether these entries are Basalt's.
+/// Whether the file is Basalt's.
 pub(super) fn is(entries: &Entries) -> bool {
     let group = entries.find("value0").and_then(|entry| entry.group().ok());
     group.is_some_and(|group| group.find("timucam").is_some())

@@ -1,4 +1,4 @@
-//! What a calibration says of a pair of cameras.
+//! The calibration of a pair of cameras.
 
 use super::lens::Lens;
 use super::matrix::{IDENTITY, Matrix, degrees, degrees_between, product, rotated, transposed};
@@ -6,32 +6,32 @@ use crate::error::{Error, Result};
 use crate::image::Rect;
 use crate::image::calib::{Calibration, Camera, Fit, Unit};
 
-/// A pair of cameras as a calibration program found it. The left camera is the first one.
+/// A pair of calibrated cameras. The left camera is the first one.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct StereoCalibration {
-    /// The cameras as they took their images, left and right.
+    /// The original cameras, left and right.
     pub lenses: Option<[Lens; 2]>,
-    /// How the right camera stands to the left one.
+    /// The pose of the right camera relative to the left one.
     pub pose: Option<Pose>,
-    /// A rectification that is part of the calibration.
-    pub views: Option<Views>,
+    /// The calibration of the rectified images, where the file has one.
+    pub views: Option<RectifiedViews>,
     /// Width and height of the images, in pixels.
     pub size: Option<(usize, usize)>,
     /// Width and height of the right images, where they differ from those of the left ones.
     pub right_size: Option<(usize, usize)>,
-    /// Whether images of another size are the middle of these, scaled until it fills them.
+    /// Whether images of another aspect ratio are the middle of these, scaled to fill them.
     pub(super) fills: bool,
     /// The unit of the baseline.
     pub unit: Unit,
-    /// What `calib.txt` says, where it is one.
+    /// The contents of `calib.txt`, if that is the file.
     pub benchmark: Option<Calibration>,
     /// The same cameras with images of other sizes.
     pub others: Vec<StereoCalibration>,
 }
 
-/// How the right camera stands to the left one: a point X in the frame of the left camera is R X + T in that of the right
-/// one. Frames are x to the right, y down, z forward.
+/// The pose of a camera relative to another: a point X in the frame of the other one (the left camera of a
+/// pair) is R X + T in its own. Frames are x to the right, y down, z forward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// R.
@@ -40,44 +40,43 @@ pub struct Pose {
     pub translation: [f64; 3],
 }
 
-/// A rectification: two pinhole cameras that look in the same direction from where the real ones stand.
+/// A rectification: two pinhole cameras at the positions of the real ones that look in the same direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Views {
-    /// From the frame of each real camera to that of its rectified view (R1 and R2).
+pub struct RectifiedViews {
+    /// The rotations from each real camera to its rectified view (R1 and R2).
     pub rotations: [Matrix; 2],
     /// The rectified cameras.
     pub cameras: [Camera; 2],
-    /// Where the left camera is in the frame of the right view: x and y, in the unit of the calibration. One of them is 0.
+    /// The left camera (x, y) in the right view's frame, in the unit of the calibration. One of the two is 0.
     pub translation: [f64; 2],
-    /// Width and height of the rectified images, where the calibration says them; else they are those of the images.
+    /// Width and height of the rectified images, if the calibration has them; else they are those of the images.
     pub size: Option<(usize, usize)>,
 }
 
 /// A camera beside the pair, such as the colour camera of a rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThirdCamera {
-    /// Where it shows a ray.
+    /// Its lens.
     pub lens: Lens,
-    /// How it stands to the left camera: a point X in the frame of that one is R X + T in its own. The left camera is the one that took
-    /// the images, not the rectified one, where the two differ.
+    /// Its pose relative to the left camera as it took the images, not to the rectified one.
     pub pose: Pose,
     /// Width and height of its images, in pixels.
     pub size: (usize, usize),
-    /// The unit of T. One that is unknown is taken for that of the pair.
+    /// The unit of T. If unknown, it is taken to be that of the pair.
     pub unit: Unit,
 }
 
 impl Pose {
-    /// Of one camera to itself.
+    /// The pose of a camera relative to itself.
     pub(super) const IN_PLACE: Self = Self { rotation: IDENTITY, translation: [0.0; 3] };
 
-    /// The way back.
+    /// The inverse pose.
     pub(super) fn inverse(&self) -> Self {
         let rotation = transposed(&self.rotation);
         Self { rotation, translation: rotated(&rotation, self.translation).map(|v| -v) }
     }
 
-    /// This one, and then `next`.
+    /// This pose, followed by `next`.
     pub(super) fn then(&self, next: &Self) -> Self {
         let moved = rotated(&next.rotation, self.translation);
         Self {
@@ -86,7 +85,7 @@ impl Pose {
         }
     }
 
-    /// How the right camera stands to the left one, where both stand like this to a third frame: from that to each of them.
+    /// The pose of the right camera relative to the left one, from the poses of both relative to a third frame.
     pub(super) fn between(left: &Self, right: &Self) -> Self {
         let rotation = product(&right.rotation, &transposed(&left.rotation));
         let moved = rotated(&rotation, left.translation);
@@ -94,24 +93,24 @@ impl Pose {
     }
 }
 
-impl Views {
-    /// Of a pair that is rectified already: two like `camera`, `baseline` apart.
+impl RectifiedViews {
+    /// The views of a rectified pair: two cameras like `camera`, `baseline` apart.
     pub(super) fn of_rectified(camera: Camera, baseline: f64) -> Self {
         Self { rotations: [IDENTITY; 2], cameras: [camera; 2], translation: [-baseline, 0.0], size: None }
     }
 
-    /// Whether columns, not rows, are epipolar lines: one camera is above the other.
+    /// Whether one camera is above the other, so that epipolar lines are columns.
     #[must_use]
     pub fn is_vertical(&self) -> bool {
         self.translation[1].abs() > self.translation[0].abs()
     }
 
-    /// Whether it makes rectified views of cameras that stand like `pose`.
+    /// Checks that the views are rectified for cameras with this `pose`.
     ///
     /// # Errors
-    /// [`Error::Calibration`] where the views look past each other, or not at right angles to the baseline.
+    /// [`Error::Calibration`] when the views differ in direction or are not perpendicular to the baseline.
     pub(crate) fn check(&self, pose: &Pose) -> Result<()> {
-        // What the digits of a file leave open is far less.
+        // Larger than the rounding of any file.
         const DEGREES: f64 = 0.1;
         let [left, right] = &self.rotations;
         let [x, y] = self.translation;
@@ -127,22 +126,22 @@ impl Views {
         )))
     }
 
-    /// Whether the right camera is on the left of the left one.
+    /// Whether the right camera is to the left of the left one.
     pub(crate) fn is_exchanged(&self) -> bool {
         !self.is_vertical() && self.translation[0] > 0.0
     }
 
-    /// The calibration with left and right camera exchanged.
+    /// The views with left and right camera exchanged.
     pub(crate) fn exchanged(&self) -> Self {
         let Self { rotations: [r1, r2], cameras: [left, right], translation, size } = *self;
         Self { rotations: [r2, r1], cameras: [right, left], translation: translation.map(|v| -v), size }
     }
 
-    /// The calibration of the rectified images, of the given size. Where the right camera is on the left of the left one, each counts as
-    /// the other.
+    /// The calibration of the rectified images, of the given size. If the right camera is to the left of the
+    /// left one, they are exchanged.
     ///
     /// # Errors
-    /// [`Error::Calibration`] where one camera is above the other, or both are in one place.
+    /// [`Error::Calibration`] when one camera is above the other, or both are in one place.
     pub fn calibration(&self, size: Option<(usize, usize)>, unit: Unit) -> Result<Calibration> {
         let error = |reason: &str| Err(Error::Calibration(reason.into()));
         if self.is_vertical() {
@@ -169,7 +168,7 @@ impl Views {
 }
 
 impl StereoCalibration {
-    /// States the unit of the baseline, whatever the files say.
+    /// Sets the unit of the baseline, whatever the files say.
     pub fn set_unit(&mut self, unit: Unit) {
         self.unit = unit;
         if let Some(benchmark) = &mut self.benchmark {
@@ -178,24 +177,24 @@ impl StereoCalibration {
         self.others.iter_mut().for_each(|other| other.set_unit(unit));
     }
 
-    /// That of the same cameras with images of all these sizes; `None` without any.
+    /// Joins calibrations of the same cameras for different image sizes; `None` if there are none.
     pub(super) fn of_sizes(sizes: Vec<Self>) -> Option<Self> {
         let mut sizes = sizes.into_iter();
         let first = sizes.next()?;
         Some(Self { others: sizes.collect(), ..first })
     }
 
-    /// Width and height of the left and of the right images, where they are known.
+    /// Width and height of the left and right images, if known.
     #[must_use]
     pub fn sizes(&self) -> Option<[(usize, usize); 2]> {
         self.size.map(|left| [left, self.right_size.unwrap_or(left)])
     }
 
-    /// The calibration of a part of the images, unscaled, such as a camera reads of its sensor or a program cuts out. Both cameras have the same
-    /// part.
+    /// The calibration of an unscaled part of the images, such as a region of the sensor or a crop. Both
+    /// cameras have the same part.
     ///
     /// # Errors
-    /// [`Error::Calibration`] where the part is empty or not inside the images, and where it is for images of several sizes.
+    /// [`Error::Calibration`] when the part is empty or not inside the images, and when the calibration is for several sizes.
     pub fn of_part(&self, part: &Rect) -> Result<Self> {
         let (width, height) = part.size();
         let error = |reason: String| Err(Error::Calibration(reason));
@@ -216,10 +215,10 @@ impl StereoCalibration {
         Ok(Self { fills: false, benchmark, ..self.in_sizes(fits) })
     }
 
-    /// What it says of images of these sizes, left and right, and how these come out of those that it is of, where they are others.
+    /// The calibration of images of these sizes, left and right, and how they derive from the calibrated images if the sizes differ.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] where nothing tells that.
+    /// [`Error::Mismatch`] when that is not clear.
     pub(crate) fn of_images(&self, sizes: [(usize, usize); 2]) -> Result<(Self, [Option<Fit>; 2])> {
         let is_of = |one: &&Self| one.sizes().is_none_or(|known| known == sizes);
         if let Some(one) = self.all().find(is_of) {
@@ -237,7 +236,7 @@ impl StereoCalibration {
         )))
     }
 
-    /// How images of these sizes come out of those that it is of, where that is clear.
+    /// How images of these sizes derive from the calibrated images, if that is clear.
     fn fits(&self, sizes: [(usize, usize); 2]) -> Option<[Option<Fit>; 2]> {
         let fit = |known: (usize, usize), size: (usize, usize)| match Fit::scaled(known, size) {
             _ if known == size => Some(None),
@@ -248,14 +247,16 @@ impl StereoCalibration {
         Some([fit(left, sizes[0])?, fit(right, sizes[1])?])
     }
 
-    /// The calibration of images that come out of the calibrated ones by `fits`, left and right.
+    /// The calibration of images that derive from the calibrated ones by `fits`, left and right.
     fn in_sizes(&self, fits: [Option<Fit>; 2]) -> Self {
         let lens = |lenses: [Lens; 2], i: usize| fits[i].map_or(lenses[i], |fit| lenses[i].in_size(&fit));
         let views = self.views.map(|views| match fits[0] {
-            // Views of a size of their own stay what they are.
-            Some(fit) if views.size.is_none_or(|size| Some(size) == self.size) => {
-                Views { cameras: views.cameras.map(|camera| camera.in_size(&fit)), size: None, ..views }
-            }
+            // Views with a size of their own stay as they are.
+            Some(fit) if views.size.is_none_or(|size| Some(size) == self.size) => RectifiedViews {
+                cameras: views.cameras.map(|camera| camera.in_size(&fit)),
+                size: None,
+                ..views
+            },
             _ => views,
         });
         let size = |i: usize| fits[i].map(|fit| fit.size).or(self.sizes().map(|sizes| sizes[i]));
@@ -268,7 +269,7 @@ impl StereoCalibration {
         }
     }
 
-    /// It, and those of the same cameras with images of other sizes.
+    /// This calibration and those of the same cameras for other image sizes.
     fn all(&self) -> impl Iterator<Item = &Self> {
         std::iter::once(self).chain(&self.others)
     }
@@ -279,11 +280,11 @@ impl StereoCalibration {
         if sizes.is_empty() { "a size that it does not say".into() } else { sizes.join(", ") }
     }
 
-    /// The calibration of images that are rectified already and of this `size`: where the file is of several, of that, and where they
-    /// are those of the file in another size, as [`Calibration::of_size`] makes it. `None` where it does not say how they were rectified.
+    /// The calibration of rectified images of this `size`: the entry of that size if the file has several,
+    /// else scaled as in [`Calibration::of_size`]. `None` if the file has no rectification.
     ///
     /// # Errors
-    /// Those of [`Views::calibration`], and [`Error::Calibration`] where it is for several sizes and not for this one.
+    /// The errors of [`RectifiedViews::calibration`], and [`Error::Calibration`] when it is for several sizes but not for this one.
     pub fn of_rectified_images(&self, size: Option<(usize, usize)>) -> Result<Option<Calibration>> {
         let in_size = |of: Calibration| size.map_or_else(|| of.clone(), |size| of.of_size(size));
         if let Some(benchmark) = &self.benchmark {
@@ -309,11 +310,11 @@ impl StereoCalibration {
         Err(Error::Calibration(format!("is for images of {sizes}{of}")))
     }
 
-    /// With the pose that the rectification implies, where a file gives that alone.
+    /// Derives the pose from the rectification, in files without a pose.
     pub(super) fn with_pose_of_views(mut self) -> Self {
         self.pose = self.pose.or_else(|| {
-            let Views { rotations: [left, right], translation: [x, y], .. } = self.views?;
-            // A point goes to the left view, along to the right one, and back to the right camera.
+            let RectifiedViews { rotations: [left, right], translation: [x, y], .. } = self.views?;
+            // A point goes to the left view, along the baseline to the right one, and to the right camera.
             let back = transposed(&right);
             Some(Pose { rotation: product(&back, &left), translation: rotated(&back, [x, y, 0.0]) })
         });
@@ -330,7 +331,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_unit_that_is_stated_holds_for_images_of_every_size() {
+    fn a_stated_unit_applies_to_every_size() {
         let other = StereoCalibration { size: Some((320, 240)), unit: Unit::Metre, ..Default::default() };
         let benchmark = Some(Calibration::default());
         let mut all = StereoCalibration { others: vec![other], benchmark, ..Default::default() };

@@ -1,4 +1,4 @@
-//! Camodocal's files of two cameras, with its own of how these stand to each other, or with VINS-Fusion's configuration.
+//! Camodocal's files of two cameras, with its own file of their pose or with VINS-Fusion's configuration.
 
 use super::cameras::{Pose, StereoCalibration};
 use super::lens::{Distortion, Lens, RadialTangential};
@@ -8,23 +8,23 @@ use super::posed::{Posed, pair};
 use crate::error::{Error, Result};
 use crate::image::calib::Unit;
 
-/// Whether these entries are those of one camera.
+/// Whether the file is of one camera.
 pub(super) fn is(entries: &Entries) -> bool {
     entries.find("modeltype").is_some() && entries.find("projectionparameters").is_some()
 }
 
-/// Whether these entries say how the cameras stand.
+/// Whether the file has the pose of the cameras.
 pub(super) fn is_rig(entries: &Entries) -> bool {
     entries.find("bodytcam0").is_some() || is_own(entries)
 }
 
-/// Whether they say it in camodocal's own form.
+/// Whether the pose is in camodocal's own form.
 fn is_own(entries: &Entries) -> bool {
     let group = entries.find("transform").and_then(|entry| entry.group().ok());
     group.is_some_and(|group| group.find("qw").is_some())
 }
 
-/// The calibration of the cameras, left and right, in this rig.
+/// The calibration of the left and right `cameras` in this `rig`.
 pub(super) fn read(rig: &Entries, cameras: [&Entries; 2]) -> Result<StereoCalibration> {
     let posed = |camera: &Entries, pose: Pose, entry| -> Result<Posed> {
         let count = |names: &str, called: &str| camera.require(names, called, "a number of pixels")?.count();
@@ -35,7 +35,7 @@ pub(super) fn read(rig: &Entries, cameras: [&Entries; 2]) -> Result<StereoCalibr
     if is_own(rig) {
         let entry = || rig.require("transform", "transform", "a rotation and a translation");
         let pose = transform(&entry()?)?;
-        // The unit is that of the board by which the cameras were calibrated.
+        // The unit is that of the calibration board.
         return pair(&posed(left, Pose::IN_PLACE, entry()?)?, &posed(right, pose, entry()?)?, Unit::Unknown);
     }
     let in_body = |camera: &Entries, names: &str, called: &str| {
@@ -47,7 +47,7 @@ pub(super) fn read(rig: &Entries, cameras: [&Entries; 2]) -> Result<StereoCalibr
     pair(&left, &right, Unit::Metre)
 }
 
-/// From the left camera to the right one.
+/// The pose of the right camera relative to the left one.
 fn transform(entry: &Entry) -> Result<Pose> {
     let entries = entry.group()?;
     let number = |names: &str, called: &str| entries.number(names, called);

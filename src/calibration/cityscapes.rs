@@ -1,11 +1,11 @@
-//! The `camera.json` of Cityscapes: that of a pair that is rectified already.
+//! The `camera.json` of Cityscapes, for a rectified pair.
 
-use super::cameras::{StereoCalibration, Views};
+use super::cameras::{RectifiedViews, StereoCalibration};
 use super::node::Entries;
 use crate::error::Result;
 use crate::image::calib::{Camera, Unit};
 
-/// Whether these entries are such a file's.
+/// Whether the file is Cityscapes's.
 pub(super) fn is(entries: &Entries) -> bool {
     let has = |group: &str, name: &str| {
         let group = entries.find(group).and_then(|entry| entry.group().ok());
@@ -22,6 +22,6 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
         focal_length: [above_0("fx")?, above_0("fy")?],
         principal_point: [intrinsic.number("u0", "u0")?, intrinsic.number("v0", "v0")?],
     };
-    let views = Views::of_rectified(camera, extrinsic.above_0("baseline", "baseline")?);
+    let views = RectifiedViews::of_rectified(camera, extrinsic.above_0("baseline", "baseline")?);
     Ok(StereoCalibration { views: Some(views), unit: Unit::Metre, ..StereoCalibration::default() })
 }

@@ -7,7 +7,7 @@ use super::posed::{Posed, pair};
 use crate::error::Result;
 use crate::image::calib::Unit;
 
-/// Names of models, each with the number of its parameters.
+/// Camera models, each with the number of its parameters.
 const MODELS: [(&str, usize); 11] = [
     ("SIMPLE_PINHOLE", 3),
     ("PINHOLE", 4),
@@ -22,11 +22,11 @@ const MODELS: [(&str, usize); 11] = [
     ("THIN_PRISM_FISHEYE", 12),
 ];
 
-// What `parse` calls them.
+// The names that `parse` gives to the two files.
 const CAMERAS: &str = "cameras.txt";
 const IMAGES: &str = "images.txt";
 
-/// The lines of one of these files as entries; `None` where it is neither.
+/// The lines of one of these files as entries; `None` for any other file.
 pub(super) fn parse(text: &str) -> Option<Node> {
     let words =
         |line: &str| Node::List(line.split_whitespace().map(|word| Node::Scalar(word.into())).collect());
@@ -42,7 +42,7 @@ pub(super) fn parse(text: &str) -> Option<Node> {
             CAMERAS
         }
         [ref placed @ .., _] if placed.len() == 9 && numbers(placed) => {
-            // Every second line has the points that the image shows, and may be empty.
+            // Every second line lists the points of the image, and may be empty.
             while let Some(line) = lines.next() {
                 if !line.trim().is_empty() {
                     rows.push(words(line));
@@ -56,7 +56,7 @@ pub(super) fn parse(text: &str) -> Option<Node> {
     Some(Node::Map(vec![(name.into(), Node::List(rows))]))
 }
 
-/// Whether these entries are of one of the files.
+/// Whether both files are COLMAP's, or either of them.
 pub(super) fn is(entries: &Entries) -> bool {
     entries.find("cameras.txt images.txt").is_some()
 }
@@ -66,12 +66,12 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     let entry = entries.require(IMAGES, IMAGES, "COLMAP's images, in the other file")?;
     let images = entry.items()?;
     let Ok([left, right]) = <[Entry; 2]>::try_from(images) else {
-        return Err(entry.error("has not two images; keep the two of the pair, the left one first"));
+        return Err(entry.error("does not have two images; keep the two of the pair, the left one first"));
     };
     pair(&image(left, &cameras)?, &image(right, &cameras)?, Unit::Unknown)
 }
 
-/// A line of `images.txt`: its number, a quaternion, a translation, the number of its camera, its name.
+/// Reads a line of `images.txt`: image number, quaternion, translation, camera number, name.
 fn image<'a>(entry: Entry<'a>, cameras: &Entry) -> Result<Posed<'a>> {
     let expected = "IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME";
     let words = entry.items()?;
@@ -88,11 +88,11 @@ fn image<'a>(entry: Entry<'a>, cameras: &Entry) -> Result<Posed<'a>> {
         }
     }
     let (lens, size) =
-        found.ok_or_else(|| entry.error(format_args!("is of camera {id}, which {CAMERAS} has not")))?;
+        found.ok_or_else(|| entry.error(format_args!("is of camera {id}, which {CAMERAS} lacks")))?;
     Ok(Posed { lens, size: Some(size), pose, entry })
 }
 
-/// A line of `cameras.txt`: its number, its model, width, height and the parameters.
+/// Reads a line of `cameras.txt`: number, model, width, height, parameters.
 fn camera(entry: &Entry) -> Result<(Lens, (usize, usize))> {
     let wrong = || entry.wrong("CAMERA_ID, MODEL, WIDTH, HEIGHT and the parameters of the model");
     let words = entry.items()?;
@@ -122,13 +122,13 @@ fn camera(entry: &Entry) -> Result<(Lens, (usize, usize))> {
             tangential: [c(2), c(3)],
             prism: [c(6), c(7)],
         },
-        // OPENCV has no k3; RADIAL has no more than k1 and k2.
+        // OPENCV has no k3; RADIAL has only k1 and k2.
         _ => {
             let all = [c(0), c(1), c(2), c(3), c(4), c(5), c(6), c(7)];
             Distortion::RadialTangential(RadialTangential::polynomials(all))
         }
     };
-    // The centre of the top left pixel is at (0.5, 0.5).
+    // COLMAP puts the centre of the top left pixel at (0.5, 0.5).
     let lens = Lens::new(focal_length, [cx - 0.5, cy - 0.5], distortion).map_err(|_| wrong())?;
     Ok((lens, (width.count()?, height.count()?)))
 }

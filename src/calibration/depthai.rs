@@ -8,22 +8,22 @@ use super::posed::{Posed, pair};
 use crate::error::Result;
 use crate::image::calib::Unit;
 
-/// Whether these entries are DepthAI's.
+/// Whether the file is DepthAI's.
 pub(super) fn is(entries: &Entries) -> bool {
     entries.find("cameradata").is_some() && entries.find("stereorectificationdata").is_some()
 }
 
 pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
-    let sockets = Sockets::of(entries)?;
+    let sockets = Sockets::read(entries)?;
     let left = posed(camera(&sockets.cameras, sockets.left)?, Pose::IN_PLACE)?;
     let right = posed(camera(&sockets.cameras, sockets.right)?, sockets.pose_of(sockets.right)?)?;
-    // Its cameras give the middle of what they see where images have another aspect.
+    // OAK cameras crop images of another aspect ratio.
     Ok(StereoCalibration { fills: true, ..pair(&left, &right, Unit::Centimetre)? })
 }
 
-/// The camera that is not one of the pair, in most of them that of colours.
+/// The camera beside the pair, usually the colour camera.
 pub(super) fn third(entries: &Entries) -> Result<ThirdCamera> {
-    let sockets = Sockets::of(entries)?;
+    let sockets = Sockets::read(entries)?;
     let mut others = Vec::new();
     for item in sockets.cameras.items()? {
         let socket = item.items()?.first().map(Entry::number).transpose()?;
@@ -42,17 +42,17 @@ pub(super) fn third(entries: &Entries) -> Result<ThirdCamera> {
     Ok(ThirdCamera { lens: third.lens, pose: third.pose, size, unit: Unit::Centimetre })
 }
 
-/// Which camera is which.
+/// The sockets of the cameras.
 struct Sockets<'a> {
     left: i64,
     right: i64,
-    /// What says so.
+    /// The entry with the sockets of the pair.
     stereo: Entry<'a>,
     cameras: Entry<'a>,
 }
 
 impl<'a> Sockets<'a> {
-    fn of(entries: &Entries<'a>) -> Result<Self> {
+    fn read(entries: &Entries<'a>) -> Result<Self> {
         let expected = "the sockets of the left and the right camera";
         let stereo = entries.require("stereorectificationdata", "stereoRectificationData", expected)?;
         let sockets = stereo.group()?;
@@ -62,9 +62,9 @@ impl<'a> Sockets<'a> {
         Ok(Self { left, right, stereo, cameras })
     }
 
-    /// How a camera stands to the left one.
+    /// The pose of a camera relative to the left one.
     fn pose_of(&self, socket: i64) -> Result<Pose> {
-        // Extrinsics lead along a chain of cameras, so one of both ways is there.
+        // Extrinsics form a chain of cameras, so they lead one way or the other.
         if let Some(pose) = chain(&self.cameras, self.left, socket)? {
             return Ok(pose);
         }
@@ -74,7 +74,7 @@ impl<'a> Sockets<'a> {
     }
 }
 
-/// The camera of a socket: cameras are pairs of a socket and what is known.
+/// The camera at a socket. Cameras are listed as pairs of socket and calibration.
 fn camera<'a>(cameras: &Entry<'a>, socket: i64) -> Result<Entry<'a>> {
     for item in cameras.items()? {
         let mut parts = item.items()?.into_iter();
@@ -87,7 +87,7 @@ fn camera<'a>(cameras: &Entry<'a>, socket: i64) -> Result<Entry<'a>> {
     Err(cameras.error(format_args!("has no camera at socket {socket}; it is to be one of the pair")))
 }
 
-/// From the camera at `from` to that at `to`, where extrinsics lead there.
+/// The pose of the camera at `to` relative to that at `from`, if extrinsics lead there.
 fn chain(cameras: &Entry, from: i64, to: i64) -> Result<Option<Pose>> {
     let (mut socket, mut pose) = (from, Pose::IN_PLACE);
     for _ in 0..cameras.items()?.len() {
@@ -123,7 +123,7 @@ fn posed(camera: Entry, pose: Pose) -> Result<Posed> {
     let kind = entries.require("cameratype", "cameraType", "0 (perspective) or 1 (fisheye)")?;
     let distortion = match kind.number()? {
         0.0 => opencv::distortion(&entry, expected, false)?,
-        // Those that a fisheye has not are 0.
+        // The remaining coefficients of a fisheye are 0.
         1.0 => match entry.list(expected)?[..] {
             [k1, k2, k3, k4, ..] => Distortion::Equidistant([k1, k2, k3, k4]),
             _ => return Err(entry.wrong("the 4 coefficients of a fisheye, and others that do not count")),

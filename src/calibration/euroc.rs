@@ -7,7 +7,7 @@ use super::posed::{Posed, pair};
 use crate::error::Result;
 use crate::image::calib::Unit;
 
-/// Whether these entries are those of one camera.
+/// Whether the file is of one camera.
 pub(super) fn is(entries: &Entries) -> bool {
     entries.find("tbs").is_some()
 }

@@ -1,6 +1,6 @@
-//! Files that are no calibration of a pair, or one that is not read, by what they begin with. Each is named, with what to do.
+//! Recognizes files that are no readable calibration of a pair by how they begin, and says what to do.
 
-/// Kinds of files: where bytes stand, which ones, and what such a file is.
+/// Kinds of files by magic bytes: the offset, the bytes, and the name of the kind.
 const KINDS: &[(usize, &[u8], &str)] = &[
     (0, b"\x89PNG", "a PNG image"),
     (0, b"\xff\xd8\xff", "a JPEG image"),
@@ -37,7 +37,7 @@ const KINDS: &[(usize, &[u8], &str)] = &[
     (128, b"DICM", "a DICOM image"),
 ];
 
-/// As [`KINDS`], with what to do about it.
+/// [`KINDS`] with a remedy.
 const KINDS_WITH_REMEDY: &[(usize, &[u8], &str)] = &[
     (0, b"\x89MCAP", "is a recording; `sequence` matches it by the calibration that is in it"),
     (0, b"#ROSBAG", "is a recording; `sequence` matches it by the calibration that is in it"),
@@ -78,7 +78,7 @@ const COLMAP: &str =
 const OPENCV: &str = "write K1, D1, K2, D2, R and T as OpenCV has them";
 const NUMBERS: &str = "give the focal length and the baseline in its place";
 
-/// Texts: what each begins with, what else is in it, whose it is, and what to do. Forms that another program exports come first.
+/// Kinds of texts: the start, other words in the text, a description and a remedy. Forms that another program exports come first.
 const TEXTS: &[(&str, &[&str], &str, &str)] = &[
     ("<<<<<<< ", &[], "has the marks of a merge in it", "resolve the merge"),
     ("<!doctype html", &[], "is a web page", "download the file itself"),
@@ -153,14 +153,14 @@ const TEXTS: &[(&str, &[&str], &str, &str)] = &[
         "{",
         &["\"cameraparameters1\""],
         "is stereoParameters of MATLAB, whose matrices are transposed",
-        "write what stereoParametersToOpenCV gives as OpenCV has it",
+        "convert it with stereoParametersToOpenCV, and write it in a format of OpenCV",
     ),
     ("[", &["\"sensor_token\"", "\"camera_intrinsic\""], "is nuScenes's of all its cameras", OPENCV),
     ("{", &["\"nbformat\""], "is a notebook of Jupyter", "give a calibration"),
     ("{", &["\"featurecollection\""], "is a map (GeoJSON)", "give a calibration"),
 ];
 
-/// What the bytes at the start of a file say of it, as an error says it; `None` where it may be a calibration.
+/// Why a file with these first bytes is no calibration; `None` if it may be one.
 pub(super) fn of_bytes(bytes: &[u8]) -> Option<String> {
     let begins = |(offset, magic, _): &&(usize, &[u8], &str)| {
         bytes.get(*offset..).is_some_and(|bytes| bytes.starts_with(magic))
@@ -171,7 +171,7 @@ pub(super) fn of_bytes(bytes: &[u8]) -> Option<String> {
     KINDS_WITH_REMEDY.iter().find(begins).map(|(.., what)| (*what).to_owned())
 }
 
-/// The name and the remedy of a text that is known to be no calibration; `None` where it may be one.
+/// Why a text is no calibration, with the remedy; `None` if it may be one.
 pub(super) fn of_text(text: &str) -> Option<String> {
     if let Some(found) = of_bytes(text.as_bytes()) {
         return Some(found);
@@ -196,7 +196,7 @@ pub(super) fn of_text(text: &str) -> Option<String> {
     found.map(|(.., what, remedy)| format!("{what}; {remedy}"))
 }
 
-/// Whose it is, where it begins with a model and numbers, then has a size and a word.
+/// The program that wrote a text of a lens model and numbers, a size and a word.
 fn member_of_dso(text: &str) -> Option<&'static str> {
     let mut lines = text.lines();
     let (first, size, third) = (lines.next()?, lines.next()?, lines.next()?);
@@ -222,7 +222,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn texts_are_told_in_lower_case() {
+    fn keywords_of_texts_are_in_lower_case() {
         for (start, rest, ..) in TEXTS {
             assert_eq!(*start, start.to_lowercase());
             assert!(rest.iter().all(|word| *word == word.to_lowercase()), "{rest:?}");

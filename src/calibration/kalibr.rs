@@ -10,7 +10,7 @@ use super::posed::apart;
 use crate::error::{Error, Result};
 use crate::image::calib::Unit;
 
-/// Whether these entries are a chain of cameras.
+/// Whether the file is a chain of cameras.
 pub(super) fn is(entries: &Entries) -> bool {
     entries.find("cam0").is_some_and(|entry| entry.group().is_ok())
 }
@@ -31,9 +31,9 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     })
 }
 
-/// From a camera of the chain to the next one, which is the `n`th, and the entry that says so.
+/// The pose of camera `n` of the chain relative to the one before it, and the entry of the pose.
 fn step<'a>(from: &Entries<'a>, to: &Entries<'a>, n: usize) -> Result<(Entry<'a>, Pose)> {
-    // What differs by less is a matter of digits.
+    // Smaller differences come from rounding.
     const DEGREES: f64 = 0.1;
     const PART: f64 = 0.01;
     let stated = to.find("tcncnm1").map(|entry| Ok::<_, Error>((entry.pose()?, entry))).transpose()?;
@@ -62,7 +62,7 @@ fn step<'a>(from: &Entries<'a>, to: &Entries<'a>, n: usize) -> Result<(Entry<'a>
     }
 }
 
-/// How a camera stands to the inertial sensor: from that to the camera.
+/// The pose of a camera relative to the inertial sensor.
 fn body<'a>(camera: &Entries<'a>) -> Result<Option<(Pose, Entry<'a>)>> {
     if let Some(entry) = camera.find("tcamimu") {
         return Ok(Some((entry.pose()?, entry)));
@@ -70,7 +70,7 @@ fn body<'a>(camera: &Entries<'a>) -> Result<Option<(Pose, Entry<'a>)>> {
     camera.find("timucam").map(|entry| Ok((entry.pose()?.inverse(), entry))).transpose()
 }
 
-/// The last camera of a chain that begins with the left one.
+/// The last camera of the chain, relative to the left one.
 pub(super) fn last(entries: &Entries) -> Result<ThirdCamera> {
     let mut last = 1;
     while entries.find(&format!("cam{}", last + 1)).is_some() {
@@ -89,12 +89,12 @@ pub(super) fn last(entries: &Entries) -> Result<ThirdCamera> {
     Ok(ThirdCamera { lens: lens(&camera)?, pose, size: size(&camera)?, unit: Unit::Metre })
 }
 
-/// The size of the images of a camera, as EuRoC has it, too.
+/// The image size of a camera, in the form that EuRoC shares.
 pub(super) fn size(camera: &Entries) -> Result<(usize, usize)> {
     camera.require("resolution", "resolution", "width and height")?.size()
 }
 
-/// The lens of a camera, as EuRoC has it, too.
+/// The lens of a camera, in the form that EuRoC shares.
 pub(super) fn lens(camera: &Entries) -> Result<Lens> {
     let (model, names) = match camera.find("cameramodel").map(|entry| (Model::of(&entry), entry)) {
         None => (Model::Pinhole, ""),
@@ -117,7 +117,7 @@ pub(super) fn lens(camera: &Entries) -> Result<Lens> {
     Lens::new([fu, fv], [pu, pv], distortion).map_err(|_| entry.wrong(&expected))
 }
 
-/// What a lens of this model does, whose `own` numbers stand before the focal length.
+/// The distortion of a lens of this model, whose `own` parameters precede the focal length.
 fn distortion(camera: &Entries, model: Model, own: &[f64]) -> Result<Distortion> {
     let expected = match model {
         Model::Pinhole => "radtan, equidistant, fov or none",
@@ -128,7 +128,7 @@ fn distortion(camera: &Entries, model: Model, own: &[f64]) -> Result<Distortion>
     let coefficients =
         || camera.require("distortioncoeffs distortioncoefficients", "distortion_coeffs", "the coefficients");
     let radial = || opencv::radial_tangential(&coefficients()?, "4 coefficients");
-    // "none" is a pinhole's.
+    // The name "none" reads as a pinhole.
     match (model, Model::of(&entry).map_err(|_| entry.wrong(expected))?, own) {
         (Model::Pinhole, Model::RadialTangential, _) => radial().map(Distortion::RadialTangential),
         (Model::Pinhole, Model::Equidistant, _) => {

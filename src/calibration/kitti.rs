@@ -1,7 +1,7 @@
-//! KITTI's calibrations: `P0` to `P3` of its odometry, and `calib_cam_to_cam.txt`, which has the lenses too. Those of `DrivingStereo` have
-//! its entries, with cameras 101 and 103.
+//! KITTI's calibrations: `P0` to `P3` of its odometry, and `calib_cam_to_cam.txt`, which also has the lenses.
+//! `DrivingStereo` uses the same entries with cameras 101 and 103.
 
-use super::cameras::{Pose, StereoCalibration, Views};
+use super::cameras::{Pose, RectifiedViews, StereoCalibration};
 use super::lens::Lens;
 use super::matrix::{IDENTITY, length};
 use super::node::{Entries, Entry};
@@ -12,16 +12,16 @@ use crate::image::calib::{Camera, Unit};
 /// Cameras 0 and 1 are grey, 2 and 3 in colour.
 const GREY: [usize; 2] = [0, 1];
 const COLOUR: [usize; 2] = [2, 3];
-/// The names of the left and right camera of `DrivingStereo`.
+/// The left and right camera of `DrivingStereo`.
 const DRIVING_STEREO: [usize; 2] = [101, 103];
 
-/// Whether these entries are KITTI's: whether a projection has a name that OpenCV's have not.
+/// Whether the file is KITTI's: whether a projection has a name that OpenCV does not use.
 pub(super) fn is(entries: &Entries) -> bool {
     let own = "prect00 prect01 prect02 prect03 prect101 prect103 p0 p3";
     entries.find_all(own).any(|entry| entry.is_matrix()) && !opencv::has_lens(entries)
 }
 
-/// The name of an entry of a camera, with two digits or three.
+/// The name of an entry of a camera, numbered with at least two digits.
 fn of_camera(stem: &str, camera: usize) -> String {
     format!("{stem}{camera:02}")
 }
@@ -39,7 +39,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
         return Err(differs(entries, "srect", cameras));
     }
     let mut calibration = StereoCalibration { unit: Unit::Metre, ..StereoCalibration::default() };
-    calibration.views = Some(Views { size, ..views(entries, cameras)? });
+    calibration.views = Some(RectifiedViews { size, ..views(entries, cameras)? });
     let [left, right] = cameras;
     if entries.find(&of_camera("k", left)).is_some() {
         calibration.lenses = Some([lens(entries, left)?, lens(entries, right)?]);
@@ -48,7 +48,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
         if self::size(entries, "s", right)? != calibration.size {
             return Err(differs(entries, "s", cameras));
         }
-        // In files for images of half the size, the offsets are those of whole ones: twice the baseline.
+        // Files for images of half the size keep the offsets of full size, which double the baseline.
         if let (DRIVING_STEREO, Some(pose), Some(views)) =
             (cameras, &calibration.pose, &mut calibration.views)
         {
@@ -60,7 +60,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     Ok(calibration)
 }
 
-/// The cameras of the pair: those in colour, unless they are not there or the file asks for the grey ones.
+/// The cameras of the pair: the colour ones, unless they are missing or the file asks for the grey ones.
 fn pair(entries: &Entries) -> Result<[usize; 2]> {
     if entries.find(&projection_names(DRIVING_STEREO[0])).is_some() {
         return Ok(DRIVING_STEREO);
@@ -76,7 +76,7 @@ fn pair(entries: &Entries) -> Result<[usize; 2]> {
     }
 }
 
-/// The size of images, such as `S_rect_02: 1.242000e+03 3.750000e+02`.
+/// The size of the images, such as `S_rect_02: 1.242000e+03 3.750000e+02`.
 fn size(entries: &Entries, stem: &str, camera: usize) -> Result<Option<(usize, usize)>> {
     entries.find(&of_camera(stem, camera)).map(|entry| entry.size()).transpose()
 }
@@ -91,11 +91,11 @@ fn differs(entries: &Entries, stem: &str, [left, right]: [usize; 2]) -> Error {
     }
 }
 
-fn views(entries: &Entries, cameras: [usize; 2]) -> Result<Views> {
+fn views(entries: &Entries, cameras: [usize; 2]) -> Result<RectifiedViews> {
     let mut rotations = [IDENTITY; 2];
     let mut projections = Vec::new();
     for (rotation, camera) in rotations.iter_mut().zip(cameras) {
-        // Images that are rectified already have none.
+        // Rectified images have no rotation.
         if let Some(entry) = entries.find(&of_camera("rrect", camera)) {
             *rotation = entry.rotation(&entry.matrix()?)?;
         }
@@ -107,7 +107,7 @@ fn views(entries: &Entries, cameras: [usize; 2]) -> Result<Views> {
     opencv::rectified(&entry, rotations, [projections[0], projections[1]])
 }
 
-/// The fourth column is where the camera is, seen through its matrix: all three numbers count.
+/// The fourth column is the camera matrix times the position of the camera, so all three numbers count.
 fn projection(entry: &Entry) -> Result<Projection> {
     match entry.matrix::<3, 4>()? {
         [[fx, 0.0, cx, tx], [0.0, fy, cy, ty], [0.0, 0.0, 1.0, tz]] if fx > 0.0 && fy > 0.0 => {
@@ -128,7 +128,7 @@ fn lens(entries: &Entries, camera: usize) -> Result<Lens> {
     Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
 }
 
-/// Both cameras stand to camera 0.
+/// The pose of the right camera relative to the left one; the file has both relative to camera 0.
 fn pose(entries: &Entries, [left, right]: [usize; 2]) -> Result<Pose> {
     let (left, right) = (from_first(entries, left)?, from_first(entries, right)?);
     let pose = Pose::between(&left.0, &right.0);
@@ -138,7 +138,7 @@ fn pose(entries: &Entries, [left, right]: [usize; 2]) -> Result<Pose> {
     Ok(pose)
 }
 
-/// From camera 0 to another one, and the entry of its translation.
+/// The pose of a camera relative to camera 0, and the entry of its translation.
 fn from_first<'a>(entries: &Entries<'a>, camera: usize) -> Result<(Pose, Entry<'a>)> {
     let expected = "the rotation from camera 0";
     let entry = entries.require(&of_camera("r", camera), &of_camera("R_", camera), expected)?;

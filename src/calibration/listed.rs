@@ -9,11 +9,11 @@ use super::posed::{Posed, pair};
 use crate::error::Result;
 use crate::image::calib::Unit;
 
-// From the camera to the body, of OKVIS and of maplab, and the way back.
+// The pose from the camera to the body, of OKVIS and of maplab, and its inverse.
 const POSES: &str = "tsc tbc";
 const BACK: &str = "tcb";
 
-/// Whether these entries are such a list.
+/// Whether the file is such a list.
 pub(super) fn is(entries: &Entries) -> bool {
     let items = entries.find("cameras").and_then(|entry| entry.items().ok());
     let first = items.and_then(|items| items.first().and_then(|item| item.group().ok()));
@@ -72,7 +72,7 @@ fn of_maplab(camera: &Entries) -> Result<(Lens, (usize, usize))> {
 fn lens(focal_length: [f64; 2], centre: [f64; 2], model: &Entry, coefficients: &Entry) -> Result<Lens> {
     let radial = || opencv::distortion(coefficients, "4 or 8 coefficients", false);
     let distortion = match (model.word()?, Model::of(model)) {
-        // maplab calls the model by the field of view so.
+        // maplab's name for the field-of-view model.
         ("fisheye", _) => Distortion::FieldOfView(coefficients.number()?),
         ("radialtangential8", _) | (_, Ok(Model::RadialTangential)) => radial()?,
         (_, Ok(Model::Equidistant)) => opencv::distortion(coefficients, "4 coefficients", true)?,

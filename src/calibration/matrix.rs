@@ -1,9 +1,9 @@
-//! Matrices of rotations, with the same bits on every platform.
+//! Rotation matrices, with the same bits on every platform.
 
 /// A matrix of three rows.
 pub type Matrix = [[f64; 3]; 3];
 
-/// The rotation that changes nothing.
+/// The identity.
 pub const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// `a` times `b`.
@@ -19,7 +19,7 @@ pub fn rotated(matrix: &Matrix, v: [f64; 3]) -> [f64; 3] {
     matrix.map(|row| dot(row, v))
 }
 
-/// Rows and columns exchanged; the inverse of a rotation.
+/// The transpose, which is the inverse of a rotation.
 #[must_use]
 pub fn transposed(m: &Matrix) -> Matrix {
     std::array::from_fn(|y| std::array::from_fn(|x| m[x][y]))
@@ -41,7 +41,7 @@ pub(crate) fn scaled(v: [f64; 3], by: f64) -> [f64; 3] {
     v.map(|x| x * by)
 }
 
-/// The rotation about `v` by its length in radians (Rodrigues).
+/// The rotation about the axis `v` by the length of `v` in radians (Rodrigues).
 #[must_use]
 pub fn rotation(v: [f64; 3]) -> Matrix {
     let angle = length(v);
@@ -57,7 +57,7 @@ pub fn rotation(v: [f64; 3]) -> Matrix {
     })
 }
 
-/// The rotation of a quaternion, w first. `None` where its length is not 1, up to the digits of a file.
+/// The rotation of a quaternion, w first. `None` if its length is not 1 up to rounding.
 pub(crate) fn of_quaternion([w, x, y, z]: [f64; 4]) -> Option<Matrix> {
     let square = w * w + x * x + y * y + z * z;
     let s = 2.0 / square;
@@ -68,10 +68,10 @@ pub(crate) fn of_quaternion([w, x, y, z]: [f64; 4]) -> Option<Matrix> {
     ])
 }
 
-/// The axis of a rotation by less than half a turn, as long as its angle in radians: the inverse of [`rotation`].
+/// The inverse of [`rotation`] for less than half a turn: the axis, with the angle in radians as length.
 #[must_use]
 pub fn rotation_vector(m: &Matrix) -> [f64; 3] {
-    // Twice the axis, as long as the sine.
+    // The axis, scaled to twice the sine of the angle.
     let v = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]];
     let sin = length(v) / 2.0;
     if sin == 0.0 {
@@ -92,10 +92,10 @@ pub(crate) fn degrees_between(a: [f64; 3], b: [f64; 3]) -> f64 {
     libm::atan2(length(cross(a, b)), dot(a, b)).to_degrees()
 }
 
-/// The rotation nearest to `m`, or `None` where `m` is none up to the digits of a file.
+/// The rotation nearest to `m`; `None` if `m` is not a rotation up to rounding.
 pub(crate) fn nearest_rotation(m: &Matrix) -> Option<Matrix> {
     const DIGITS: f64 = 1e-2;
-    // By Newton's iteration for the orthogonal factor; it converges quadratically from so near.
+    // Newton's iteration for the orthogonal factor, which converges quadratically from a start so close.
     let mut near = *m;
     for _ in 0..8 {
         let [a, b, c] = near;
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vector_is_its_rotation() {
+    fn rotation_vectors_survive_a_round_trip() {
         for v in [[0.0; 3], [0.1, -0.2, 0.3], [1e-9, 0.0, 0.0], [0.0, 2.9, 0.0]] {
             let matrix = rotation(v);
             assert!(close(&product(&matrix, &transposed(&matrix)), &IDENTITY), "{v:?}");
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quaternion_is_its_rotation() {
+    fn a_quaternion_gives_its_rotation() {
         let (half, axis) = (0.35_f64, [0.36, -0.48, 0.8]);
         let q = [half.cos(), half.sin() * axis[0], half.sin() * axis[1], half.sin() * axis[2]];
         assert!(close(&of_quaternion(q).unwrap(), &rotation(scaled(axis, 0.7))));
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn digits_that_a_file_lacks_are_found_again() {
+    fn rounded_rotations_are_restored() {
         let exact = rotation([0.02, -0.1, 0.05]);
         let rounded = exact.map(|row| row.map(|v| (v * 1e4).round() / 1e4));
         let near = nearest_rotation(&rounded).unwrap();

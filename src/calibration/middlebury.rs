@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::cameras::{Pose, StereoCalibration, Views};
+use super::cameras::{Pose, RectifiedViews, StereoCalibration};
 use super::lens::{Distortion, Lens};
 use super::matrix::IDENTITY;
 use crate::error::Result;
 use crate::image::calib::{Calibration, Camera};
 
-/// Whether a text is meant as such a file.
+/// Whether a text is meant to be such a file.
 pub(super) fn is(text: &str) -> bool {
     Calibration::is_meant(text)
 }
@@ -25,7 +25,7 @@ pub(super) fn of_text(path: &Path, text: &str) -> Result<StereoCalibration> {
         let lens = |camera: Camera| Lens::new(camera.focal_length, camera.principal_point, Distortion::NONE);
         calibration.lenses = Some([lens(left)?, lens(right)?]);
         calibration.pose = Some(Pose { rotation: IDENTITY, translation: [-baseline, 0.0, 0.0] });
-        calibration.views = Some(Views {
+        calibration.views = Some(RectifiedViews {
             rotations: [IDENTITY; 2],
             cameras: [left, right],
             translation: [-baseline, 0.0],

@@ -1,8 +1,8 @@
-//! Calibrations of pairs of cameras, as the programs that people have write them.
+//! Reads the calibrations of stereo cameras in the forms of many programs.
 //!
-//! [`read`] takes the files of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, VINS-Fusion, Basalt, ZED, OAK and RealSense cameras, COLMAP, mrcal, OKVIS,
-//! KITTI, Cityscapes and Middlebury, and tells them apart by their content. [`Rectification`](crate::rectification::Rectification) rectifies by them, and
-//! [`Rig`](crate::depth::Rig) takes depths from them. [`third::read`] takes a camera beside the pair, into whose view depths are rendered.
+//! [`read`] takes the files of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, VINS-Fusion, Basalt, ZED, OAK and RealSense cameras, COLMAP, mrcal,
+//! OKVIS, KITTI, Cityscapes and Middlebury, and tells them apart by their content. [`third::read`] reads a camera beside the pair, into
+//! whose view depths can be rendered.
 
 mod basalt;
 pub mod cameras;
@@ -47,20 +47,20 @@ use crate::error::{Error, Result};
 use crate::image::calib::Unit;
 use crate::text;
 
-/// A calibration is a few kilobytes; no more than this is read.
+/// The limit for a file; calibrations are a few kilobytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// An archive of numpy may also hold maps, which are passed over.
+/// An archive of numpy may also hold large maps, which are skipped.
 const MAX_ARCHIVE: u64 = 1 << 28;
 
-/// What a file should be, as an error says it.
+/// The error for a file of no known form.
 const KNOWN: &str = "is no calibration of a known form: expected the entries of OpenCV (K1, D1, K2, D2, R, T), ROS (camera_matrix, projection_matrix), Kalibr (cam0, \
                      cam1), EuRoC (T_BS), KITTI (P0 to P3), or of another program that the guide lists";
 
-/// What reads the entries of a file, or of several, in a form.
+/// Reads one or more files in a form; `None` if they are not of this form.
 type Read = fn(&[Entries]) -> Option<Result<StereoCalibration>>;
 
-/// The forms in which calibrations are read, each with its name. `None` from those that it is not.
+/// The forms of calibrations, each with its name. The first one that takes the files counts.
 const FORMS: [(&str, Read); 16] = [
     ("Kalibr's", |files| alone(files, kalibr::is, kalibr::read)),
     ("KITTI's", |files| alone(files, kitti::is, kitti::read)),
@@ -111,7 +111,7 @@ const FORMS: [(&str, Read); 16] = [
     ("OpenCV's", parts::read),
 ];
 
-/// What `read` reads of a form that has one file, where it `is` that.
+/// Reads a form of one file, if the files are that.
 fn alone(
     files: &[Entries],
     is: fn(&Entries) -> bool,
@@ -127,8 +127,8 @@ fn other_missing(one: &Entries, entry: &str) -> Result<StereoCalibration> {
     Err(Error::read(one.path(), format!("{entry}: is of one camera; give the file of the other one too")))
 }
 
-/// Reads a calibration from one file, or from several that belong together: ROS's and EuRoC's for the left and the right camera,
-/// OpenCV's for the lenses and for how the cameras stand, COLMAP's two, or VINS-Fusion's three. They may be packed by gzip.
+/// Reads a calibration from one file, or from several: ROS's and EuRoC's of the left and the right camera,
+/// OpenCV's of the lenses and of the pose, COLMAP's two, or VINS-Fusion's three. They may be packed by gzip.
 ///
 /// # Errors
 /// [`Error::Read`] when a file cannot be read, or an entry is wrong or missing; the error names the file and the entry.
@@ -136,10 +136,10 @@ pub fn read(files: &[PathBuf]) -> Result<StereoCalibration> {
     of_texts(&files.iter().map(|path| Ok((path.as_path(), text(path)?))).collect::<Result<Vec<_>>>()?)
 }
 
-/// What a calibration file holds: [`of_texts`] takes it. It is unpacked where it is packed by gzip, and the arrays of an `.npz` are lines.
+/// The text of a calibration file, for [`of_texts`]. Unpacks gzip, and turns the arrays of an `.npz` into lines.
 ///
 /// # Errors
-/// [`Error::Read`] when it cannot be read, is larger than any calibration, or is of a kind that is none, such as an image.
+/// [`Error::Read`] when it cannot be read, is too large, or is another kind of file, such as an image.
 pub fn text(file: &Path) -> Result<String> {
     let wrong = |reason: String| Error::read(file, reason);
     if file.is_dir() {
@@ -166,15 +166,15 @@ pub fn text(file: &Path) -> Result<String> {
         [0xfe, 0xff, ..] => u16::from_be_bytes,
         _ => return Ok(String::from_utf8_lossy(&bytes).into_owned()),
     };
-    // As Windows saves what it calls Unicode.
+    // UTF-16, which Windows calls Unicode.
     let units = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
     Ok(char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect())
 }
 
-/// As [`read`], of files that are in memory, each with the name by which errors call it.
+/// Like [`read`], for files in memory, each with its name for errors.
 ///
 /// # Errors
-/// Those of [`read`].
+/// The errors of [`read`].
 pub fn of_texts(files: &[(&Path, String)]) -> Result<StereoCalibration> {
     if let [(path, text)] = files
         && middlebury::is(text)
@@ -213,7 +213,7 @@ pub fn of_texts(files: &[(&Path, String)]) -> Result<StereoCalibration> {
     }
 }
 
-/// What the files say in the first form that takes them, and its name.
+/// Reads the files in the first form that takes them; with the name of the form.
 fn in_some_form<'a>(each: &[Entries]) -> Option<(&'a str, Result<StereoCalibration>)> {
     FORMS.iter().find_map(|(name, read)| {
         let found = read(each)?.and_then(|found| in_stated_unit(found, each));
@@ -221,7 +221,7 @@ fn in_some_form<'a>(each: &[Entries]) -> Option<(&'a str, Result<StereoCalibrati
     })
 }
 
-/// What a file states counts, whatever the unit of its form is.
+/// A unit that the files state overrides that of the form.
 fn in_stated_unit(mut found: StereoCalibration, each: &[Entries]) -> Result<StereoCalibration> {
     let stated = opencv::unit(&Entries::together(each))?;
     if stated != Unit::Unknown {
@@ -230,7 +230,7 @@ fn in_stated_unit(mut found: StereoCalibration, each: &[Entries]) -> Result<Ster
     Ok(found)
 }
 
-/// An error about a file beside one that says all.
+/// The error for a file beside one that is complete.
 fn not_needed(file: &Path, whole: &Path, form: &str) -> Error {
     let reason = format!(
         "is not needed: {} is a whole calibration (read as {form}); leave one of them out",
@@ -239,7 +239,7 @@ fn not_needed(file: &Path, whole: &Path, form: &str) -> Error {
     Error::read(file, reason)
 }
 
-/// An error that says in which form the file was read.
+/// Adds the form in which the file was read to an error.
 fn in_form(error: Error, name: &str) -> Error {
     match error {
         Error::Read { path, cause } => Error::read(path, format!("{cause} (read as {name})")),
@@ -247,7 +247,7 @@ fn in_form(error: Error, name: &str) -> Error {
     }
 }
 
-/// What a file holds, unpacked where it is packed by gzip.
+/// The bytes of a file, unpacked if packed by gzip.
 fn unpacked(path: &Path, bytes: Vec<u8>) -> Result<Vec<u8>> {
     if !bytes.starts_with(&[0x1f, 0x8b]) {
         return Ok(bytes);
@@ -261,7 +261,7 @@ fn unpacked(path: &Path, bytes: Vec<u8>) -> Result<Vec<u8>> {
     }
 }
 
-/// The entries of a file, for each camera where it has them apart.
+/// The entries of a file, one set for each camera if it separates them.
 fn roots(path: &Path, text: &str) -> Result<Vec<Node>> {
     let plain = text.trim_start_matches('\u{feff}').trim_start();
     if ost::is(plain) {
@@ -290,7 +290,7 @@ fn root(path: &Path, text: &str) -> Result<Node> {
         Some('<') if syntax::is_xml(text) => syntax::xml(text),
         Some('{') if syntax::is_json(text) => syntax::json(text),
         Some('[') if syntax::is_ini(text) => syntax::ini(text),
-        // What only might be YAML is not to be told its errors.
+        // Report YAML errors only for files that are certainly YAML.
         _ => syntax::yaml(text)
             .map_err(|reason| if syntax::is_yaml(path, text) { reason } else { KNOWN.into() }),
     };

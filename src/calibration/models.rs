@@ -1,16 +1,16 @@
-//! Lens models by the names that programs give them.
+//! The names of lens models in the files of different programs.
 
 use super::node::Entry;
 use crate::error::Result;
 
-/// What a name says of a lens.
+/// A lens model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Model {
-    /// A pinhole, with whatever distortion.
+    /// A pinhole, with any distortion.
     Pinhole,
     /// Radial and tangential distortion.
     RadialTangential,
-    /// A fisheye of Kannala and Brandt.
+    /// The fisheye of Kannala and Brandt.
     Equidistant,
     /// The unified model of Mei and Rives.
     Unified,
@@ -18,11 +18,11 @@ pub(super) enum Model {
     DoubleSphere,
     /// The extended unified model.
     ExtendedUnified,
-    /// By the field of view.
+    /// The field-of-view model.
     FieldOfView,
 }
 
-/// In lower case, without what separates words.
+/// Names in lower case, without separators.
 const NAMES: [(Model, &[&str]); 7] = [
     (Model::Pinhole, &["pinhole", "perspective", "none"]),
     (
@@ -70,7 +70,7 @@ impl Model {
         known.map(|(model, _)| *model).ok_or_else(|| entry.wrong(expected))
     }
 
-    /// Whether it is OpenCV's fisheye, where it says that.
+    /// Whether the model is OpenCV's fisheye; `None` if the name leaves that open.
     pub(super) fn is_fisheye(self) -> Option<bool> {
         match self {
             Self::Pinhole | Self::Unified => None,

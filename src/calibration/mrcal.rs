@@ -12,15 +12,15 @@ use crate::image::calib::Unit;
 const MODEL: &str = "lensmodel distortionmodel";
 const POSE: &str = "extrinsics rtcamref";
 
-/// The entries of such a file, which is a dictionary of Python; `None` where it is none. The error is one line.
+/// The entries of such a file, a Python dictionary; `None` for any other file. The error is one line.
 pub(super) fn parse(text: &str) -> Option<Result<Node, String>> {
     let first = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#'))?;
     let is = first.trim_start().starts_with('{') && text.contains("LENSMODEL_");
-    // Strings of bytes, and lists in parentheses, are no YAML.
+    // Make YAML of byte strings and of lists in parentheses.
     is.then(|| syntax::yaml(&text.replace("b'", "'").replace('(', "[").replace(')', "]")))
 }
 
-/// Whether these entries are those of one camera.
+/// Whether the file is of one camera.
 pub(super) fn is(entries: &Entries) -> bool {
     let model = entries.find(MODEL).and_then(|entry| entry.word().ok());
     model.is_some_and(|model| model.starts_with("LENSMODEL_"))
@@ -28,7 +28,7 @@ pub(super) fn is(entries: &Entries) -> bool {
 
 pub(super) fn read(cameras: [&Entries; 2]) -> Result<StereoCalibration> {
     let [left, right] = cameras.map(camera);
-    // That of the board by which the cameras were calibrated.
+    // The unit is that of the calibration board.
     pair(&left?, &right?, Unit::Unknown)
 }
 

@@ -1,4 +1,4 @@
-//! The entries of a calibration file, whatever its syntax.
+//! The entries of a calibration file, independent of its syntax.
 
 use std::path::Path;
 
@@ -10,29 +10,29 @@ use crate::calibration::matrix::{Matrix, of_quaternion};
 use crate::error::{Error, Result};
 use crate::text::quoted;
 
-/// Entries may lie this deep in each other; calibrations need four levels.
+/// The deepest nesting of entries; calibrations need four levels.
 pub(super) const MAX_DEPTH: usize = 16;
 
-/// A group holds at most this many entries; calibrations have dozens.
+/// The most entries of a group; calibrations have dozens.
 pub(super) const MAX_ENTRIES: usize = 1000;
 
 /// A value.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Node {
-    /// A word, a number, or numbers with blanks between them.
+    /// A word, a number, or numbers separated by blanks.
     Scalar(String),
     List(Vec<Node>),
     Map(Vec<(String, Node)>),
 }
 
 impl Node {
-    /// The value of `key`, spelt like this.
+    /// The value of `key`, with exactly this spelling.
     pub(super) fn get(&self, key: &str) -> Option<&Self> {
         let Self::Map(entries) = self else { return None };
         entries.iter().find(|(name, _)| name == key).map(|(_, node)| node)
     }
 
-    /// All numbers of a scalar, a list, a list of lists or an `opencv-matrix`; `None` where there is anything else.
+    /// All numbers of a scalar, a list, a list of lists or an `opencv-matrix`; `None` if there is anything else.
     fn numbers(&self) -> Option<Vec<f64>> {
         match self {
             Self::Scalar(text) => {
@@ -59,7 +59,7 @@ impl Node {
         }
     }
 
-    /// The numbers of a matrix that OpenCV has written in base64: 24 bytes that say their type, such as `1d`, then the numbers.
+    /// Numbers of a matrix in OpenCV's base64, after 24 bytes that state their type, such as `1d`.
     fn packed(&self) -> Option<Vec<f64>> {
         let Self::Scalar(text) = self else { return None };
         let text: String = text.trim_start_matches("$base64$").split_whitespace().collect();
@@ -88,7 +88,7 @@ impl Node {
     }
 }
 
-/// A name in lower case, without what separates words.
+/// A name in lower case, without separators.
 fn plain(name: &str) -> String {
     name.chars().filter(|c| !['_', '-', ' '].contains(c)).collect::<String>().to_lowercase()
 }
@@ -98,10 +98,10 @@ fn unpacked<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Opt
     numbers.collect()
 }
 
-/// The entries of one or several files that belong together.
+/// The entries of one file, or of several that belong together.
 pub(super) struct Entries<'a> {
     files: Vec<(&'a Path, &'a Node)>,
-    /// The name of the group they are in, with a dot: `cam0.`.
+    /// The name of their group, with a dot: `cam0.`.
     group: String,
 }
 
@@ -117,17 +117,17 @@ impl<'a> Entries<'a> {
         Self { files, group: String::new() }
     }
 
-    /// Those of all these files.
+    /// The entries of all these files.
     pub(super) fn together(files: &[Self]) -> Self {
         Self::new(files.iter().flat_map(|entries| entries.files.iter().copied()).collect())
     }
 
-    /// The first entry that has one of `names`: words in lower case, without `_` and `-`.
+    /// The first entry with one of `names`: words in lower case, without `_` and `-`.
     pub(super) fn find(&self, names: &str) -> Option<Entry<'a>> {
         self.find_all(names).next()
     }
 
-    /// All entries that have one of `names`; see [`Entries::find`].
+    /// All entries with one of `names`; see [`Entries::find`].
     pub(super) fn find_all(&self, names: &str) -> impl Iterator<Item = Entry<'a>> {
         let is_one = move |name: &str| names.split(' ').any(|known| known == plain(name));
         self.each().filter(move |(_, name, _)| is_one(name)).map(|(path, name, node)| Entry {
@@ -149,7 +149,7 @@ impl<'a> Entries<'a> {
         })
     }
 
-    /// An error where entries of one meaning, which has these `names`, say different things.
+    /// An error if entries with these `names`, which are synonyms, have different values.
     pub(super) fn agree(&self, names: &str) -> Result<()> {
         let mut all = self.find_all(names);
         let Some(first) = all.next() else { return Ok(()) };
@@ -167,30 +167,30 @@ impl<'a> Entries<'a> {
         }
     }
 
-    /// As [`Entries::find`]; the error says that it is missing and what was `expected`, calling it `called`.
+    /// Like [`Entries::find`]; if it is missing, an error names it `called` and says what was `expected`.
     pub(super) fn require(&self, names: &str, called: &str, expected: &str) -> Result<Entry<'a>> {
         self.find(names).ok_or_else(|| {
             Error::read(self.path(), format!("{}{called} is missing: expected {expected}", self.group))
         })
     }
 
-    /// The number in the entry that is called so; see [`Entries::require`].
+    /// The number in an entry; see [`Entries::require`].
     pub(super) fn number(&self, names: &str, called: &str) -> Result<f64> {
         self.require(names, called, "a number")?.number()
     }
 
-    /// As [`Entries::number`]; 0 where there is none.
+    /// Like [`Entries::number`]; 0 if there is none.
     pub(super) fn number_or_zero(&self, names: &str) -> Result<f64> {
         self.find(names).map_or(Ok(0.0), |entry| entry.number())
     }
 
-    /// As [`Entries::number`], of one above 0.
+    /// Like [`Entries::number`], for a number above 0.
     pub(super) fn above_0(&self, names: &str, called: &str) -> Result<f64> {
         let entry = self.require(names, called, "a number above 0")?;
         entry.number().ok().filter(|v| *v > 0.0).ok_or_else(|| entry.wrong("a number above 0"))
     }
 
-    /// The file that errors of all entries together name.
+    /// The file to name in errors about all entries together.
     pub(super) fn path(&self) -> &'a Path {
         self.files[0].0
     }
@@ -202,17 +202,17 @@ impl<'a> Entry<'a> {
         Error::read(self.path, format!("{}: expected {expected}, found {found}", self.name))
     }
 
-    /// An error about this entry, for this `reason`.
+    /// An error about this entry.
     pub(super) fn error(&self, reason: impl std::fmt::Display) -> Error {
         Error::read(self.path, format!("{}: {reason}", self.name))
     }
 
-    /// Its name, as the file spells it.
+    /// The name of the entry, as the file spells it.
     pub(super) fn name(&self) -> &str {
         &self.name
     }
 
-    /// Whether another entry says the same, as far as both say it in as many numbers.
+    /// Whether another entry has the same value. Numbers are compared only if their counts agree.
     fn says(&self, other: &Self) -> bool {
         match (self.node.numbers(), other.node.numbers()) {
             (Some(one), Some(two)) => one.len() != two.len() || one == two,
@@ -220,18 +220,18 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// Whether it looks like the matrix of a camera, damaged or not: like OpenCV's of any size, or 9 numbers or 12.
+    /// Whether it looks like a camera matrix, even a damaged one: an OpenCV matrix of any size, or 9 or 12 numbers.
     pub(super) fn is_matrix(&self) -> bool {
         self.node.get("data").is_some()
             || self.node.numbers().is_some_and(|numbers| matches!(numbers.len(), 9 | 12))
     }
 
-    /// Whether a list or a group is in it.
+    /// Whether it is a list or a group.
     pub(super) fn is_compound(&self) -> bool {
         !matches!(self.node, Node::Scalar(_))
     }
 
-    /// The entries in it.
+    /// The entries of a group.
     pub(super) fn group(&self) -> Result<Entries<'a>> {
         match self.node {
             Node::Map(_) => {
@@ -241,13 +241,13 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// So many numbers; `expected` says which.
+    /// Exactly `N` numbers; `expected` describes them in errors.
     pub(super) fn numbers<const N: usize>(&self, expected: &str) -> Result<[f64; N]> {
         let numbers = self.node.numbers().and_then(|numbers| numbers.try_into().ok());
         numbers.ok_or_else(|| self.wrong(expected))
     }
 
-    /// Any number of numbers.
+    /// Any number of numbers; `expected` describes them in errors.
     pub(super) fn list(&self, expected: &str) -> Result<Vec<f64>> {
         self.node.numbers().ok_or_else(|| self.wrong(expected))
     }
@@ -262,7 +262,7 @@ impl<'a> Entry<'a> {
         Ok(std::array::from_fn(|y| std::array::from_fn(|x| numbers[y * C + x])))
     }
 
-    /// A rotation.
+    /// The rotation that `matrix`, the value of this entry, stands for.
     pub(super) fn rotation(&self, matrix: &Matrix) -> Result<Matrix> {
         let wrong = || self.wrong("a rotation, whose rows are at right angles and of length 1");
         super::matrix::nearest_rotation(matrix).ok_or_else(wrong)

@@ -1,17 +1,17 @@
-//! Archives of numpy, `.npz`: the arrays that `np.savez` has saved of a calibration, as text.
+//! Reads calibrations saved by `np.savez` (`.npz`), as text.
 
 use std::fmt::Write;
 use std::io::Read as _;
 
 use flate2::read::DeflateDecoder;
 
-/// The largest array of a calibration has 16 numbers; maps, which stand beside them, are passed over.
+/// The largest array of a calibration has 16 numbers; larger arrays, such as maps, are skipped.
 const MOST_NUMBERS: usize = 64;
 
-/// More than an array of so few numbers has, with its header.
+/// More bytes than such an array has with its header.
 const MOST_BYTES: u64 = 1 << 16;
 
-/// Whether a file is an archive, of numpy or of another program.
+/// Whether a file is a ZIP archive, of numpy or not.
 pub(super) fn is_archive(bytes: &[u8]) -> bool {
     bytes.starts_with(b"PK\x03\x04")
 }
@@ -22,7 +22,7 @@ pub(super) fn is(bytes: &[u8]) -> bool {
         && members(bytes).is_some_and(|all| all.iter().any(|(name, ..)| name.strip_suffix(".npy").is_some()))
 }
 
-/// The small arrays of an archive, one a line: `R: [1.0, 0.0, ...]`. The error is one line.
+/// The small arrays of an archive, one per line: `R: [1.0, 0.0, ...]`. The error is one line.
 pub(super) fn text(bytes: &[u8]) -> Result<String, String> {
     const DAMAGED: &str = "is a damaged .npz; save it again";
     let mut text = String::new();
@@ -53,7 +53,7 @@ fn is_plain(name: &str) -> bool {
     name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
-/// Name, method and bytes of each member, by the table at the end. `None` where that is damaged.
+/// Name, method and bytes of each member, from the table at the end. `None` if that is damaged.
 fn members(bytes: &[u8]) -> Option<Vec<(String, u64, &[u8])>> {
     let end = bytes.windows(4).rposition(|four| four == b"PK\x05\x06")?;
     let (count, mut at) = (int(bytes, end + 10, 2)?, usize::try_from(int(bytes, end + 16, 4)?).ok()?);
@@ -66,7 +66,7 @@ fn members(bytes: &[u8]) -> Option<Vec<(String, u64, &[u8])>> {
         let (method, length, local) = (int(bytes, at + 10, 2)?, field(20, 4)?, field(42, 4)?);
         let (name, extra, comment) = (field(28, 2)?, field(30, 2)?, field(32, 2)?);
         let text = String::from_utf8_lossy(bytes.get(at + 46..at + 46 + name)?).into_owned();
-        // The lengths before the data are its own.
+        // The local header has name and extra lengths of its own.
         let skipped = int(bytes, local.checked_add(26)?, 2)? + int(bytes, local.checked_add(28)?, 2)?;
         let start = local + 30 + skipped as usize;
         found.push((text, method, bytes.get(start..start.checked_add(length)?)?));
@@ -75,13 +75,13 @@ fn members(bytes: &[u8]) -> Option<Vec<(String, u64, &[u8])>> {
     Some(found)
 }
 
-/// The integer of `size` bytes at `at`.
+/// The little-endian integer of `size` bytes at `at`.
 fn int(bytes: &[u8], at: usize, size: usize) -> Option<u64> {
     let bytes = bytes.get(at..at.checked_add(size)?)?;
     Some(bytes.iter().rev().fold(0, |value, byte| value << 8 | u64::from(*byte)))
 }
 
-/// The numbers of an array, row by row; `None` where there are many, or anything else.
+/// The numbers of an array, row by row; `None` for large arrays, and for anything but numbers.
 fn numbers(array: &[u8]) -> Option<Vec<f64>> {
     let rest = array.strip_prefix(b"\x93NUMPY")?;
     let size = if *rest.first()? == 1 { 2 } else { 4 };
@@ -111,7 +111,7 @@ fn numbers(array: &[u8]) -> Option<Vec<f64>> {
         _ => None,
     }?;
     match shape[..] {
-        // Column by column.
+        // Stored column by column.
         [rows, columns] if header.contains("'fortran_order': True") => {
             Some((0..count).map(|i| all[i % columns * rows + i / columns]).collect())
         }

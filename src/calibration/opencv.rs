@@ -1,6 +1,6 @@
-//! OpenCV's stereo calibrations, in YAML or XML, by the names that its programs and most others give to entries.
+//! OpenCV's stereo calibrations in YAML or XML, by the names that it and most other programs use.
 
-use super::cameras::{Pose, StereoCalibration, Views};
+use super::cameras::{Pose, RectifiedViews, StereoCalibration};
 use super::lens::{Distortion, Lens, RadialTangential};
 use super::matrix::{IDENTITY, Matrix, length, rotation};
 use super::models::Model;
@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::image::calib::{Camera, Unit};
 use crate::text::letters_apart;
 
-// In lower case and without `_`, as `Entries::find` takes them.
+// In lower case and without `_`, as for `Entries::find`.
 const CAMERA: [&str; 2] = [
     "k1 m1 cameramatrix1 cameramatrixleft leftcameramatrix kleft kl leftk mleft cameramatrixl ml mtxl mtx1 leftmtx mtxleft left.k",
     "k2 m2 cameramatrix2 cameramatrixright rightcameramatrix kright kr rightk mright cameramatrixr mr mtxr mtx2 rightmtx mtxright right.k",
@@ -18,7 +18,7 @@ const DISTORTION: [&str; 2] = [
     "d1 distcoeffs1 distortioncoefficients1 dist1 distcoeffsleft leftdistcoeffs dleft dl distcoeffsl distcoeffl distl distleft leftdist leftdistortion distortionleft left.d",
     "d2 distcoeffs2 distortioncoefficients2 dist2 distcoeffsright rightdistcoeffs dright dr distcoeffsr distcoeffr distr distright rightdist rightdistortion distortionright right.d",
 ];
-// Of one camera, without a number.
+// The names for a single camera, without a number.
 const ALONE: &str = "k cameramatrix m intrinsicmatrix mtx";
 const DISTORTION_ALONE: &str = "d distortioncoefficients distcoeffs dist";
 pub(super) const ROTATION: &str = "r rotation rotationmatrix stereor rot";
@@ -38,35 +38,35 @@ const FISHEYE: &str = "fisheye fisheyemodel usefisheye";
 const MODEL: [&str; 2] = ["distortionmodel distortiontype lensmodel", "cameramodel"];
 const Q: &str = "q disparitytodepth disptodepth";
 const UNIT: &str = "unit units";
-/// What is not required, so that a slip in its name would go unseen.
+/// Optional entries, whose misspelling would otherwise go unnoticed.
 const OPTIONAL: [&str; 5] = ["fisheye", "unit", "imagesize", "newimagesize", "distortionmodel"];
 
-/// Whether there is a lens by its names.
+/// Whether there is a camera matrix of a pair.
 pub(super) fn has_lens(entries: &Entries) -> bool {
     CAMERA.iter().any(|names| entries.find(names).is_some())
 }
 
-/// Whether these entries are OpenCV's: whether there is any camera. Short names are those of other things, too.
+/// Whether the entries are OpenCV's, by a matrix of a camera. A short name alone may mean something else.
 pub(super) fn is(entries: &Entries) -> bool {
     let mut all =
         CAMERA.iter().chain(&PROJECTION).chain(&DISTORTION).flat_map(|names| entries.find_all(names));
     all.any(|entry| entry.is_matrix() || entry.name().len() > 4 && entry.is_compound())
 }
 
-/// Whether there is R with T, as OpenCV's stereo calibration has them.
+/// Whether there are R and T, as in OpenCV's stereo calibrations.
 pub(super) fn has_pose(entries: &Entries) -> bool {
     let has = |names: &str| entries.find(names).is_some_and(|entry| entry.is_compound());
     has(ROTATION) && has(TRANSLATION)
 }
 
-/// All that is read, by its names.
+/// The names of all entries that are read.
 fn known() -> impl Iterator<Item = &'static str> {
     let pairs = [CAMERA, DISTORTION, RECTIFICATION, PROJECTION, XI, MODEL];
     let others = [ROTATION, TRANSLATION, SIZE, NEW_SIZE, WIDTH, HEIGHT, FISHEYE, Q, UNIT];
     pairs.into_iter().flatten().chain(others)
 }
 
-/// Whether each of these files has what none of the others has.
+/// Whether each of these files has an entry that none of the others has.
 pub(super) fn needs_all(files: &[Entries]) -> bool {
     let is_needed = |i: usize| {
         known().any(|names| {
@@ -96,7 +96,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     Ok(calibration)
 }
 
-/// An error where a name is nearly that of an entry that changes what is read. Others, and what only adds to a name, are left alone.
+/// An error if a name is nearly that of an optional entry. Longer names that contain one are accepted.
 fn rightly_spelt(entries: &Entries) -> Result<()> {
     let is_known = |name: &str| known().any(|names| names.split(' ').any(|known| known == name));
     let is_near = |name: &str, known: &str| {
@@ -114,9 +114,9 @@ fn rightly_spelt(entries: &Entries) -> Result<()> {
     Ok(())
 }
 
-/// T, P2 and Q each say the distance of the cameras; an error where they differ.
+/// T, P2 and Q each give the baseline; an error if they differ.
 fn check_baseline(entries: &Entries, calibration: &StereoCalibration) -> Result<()> {
-    // Files round their numbers.
+    // Tolerates the rounding of files.
     const ROUNDING: f64 = 0.01;
     let mut said: Vec<(Entry, f64)> = Vec::new();
     let mut put =
@@ -124,7 +124,7 @@ fn check_baseline(entries: &Entries, calibration: &StereoCalibration) -> Result<
     if let Some(pose) = &calibration.pose {
         put(TRANSLATION, length(pose.translation));
     }
-    if let Some(Views { translation: [x, y], .. }) = calibration.views {
+    if let Some(RectifiedViews { translation: [x, y], .. }) = calibration.views {
         put(PROJECTION[1], length([x, y, 0.0]));
     }
     if let Some(entry) = entries.find(Q) {
@@ -148,7 +148,7 @@ fn check_baseline(entries: &Entries, calibration: &StereoCalibration) -> Result<
     }
 }
 
-/// A number with four digits, as a message shows it.
+/// A number with four significant digits, for messages.
 fn digits(number: f64) -> String {
     let before = libm::log10(number).floor() as i32;
     match usize::try_from(3 - before) {
@@ -157,7 +157,7 @@ fn digits(number: f64) -> String {
     }
 }
 
-/// The unit that they state.
+/// The unit that the entries state.
 pub(super) fn unit(entries: &Entries) -> Result<Unit> {
     let Some(unit) = entries.find(UNIT) else { return Ok(Unit::Unknown) };
     unit.word()?.parse().map_err(|expected: &str| unit.wrong(expected))
@@ -182,19 +182,19 @@ fn lens(entries: &Entries, view: usize) -> Result<Lens> {
     let expected = "the coefficients of the distortion";
     let fisheye = is_fisheye(entries)?;
     let distortion = match entries.find(XI[view]) {
-        // Of OpenCV's module omnidir.
+        // OpenCV's module omnidir.
         Some(xi) => Distortion::Unified { xi: xi.number()?, then: radial_tangential(&entry, expected)? },
         None => distortion(&entry, expected, fisheye)?,
     };
     Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
 }
 
-/// Whether there is the lens of one camera, which has no number.
+/// Whether there is the camera matrix of a single camera.
 pub(super) fn has_lens_alone(entries: &Entries) -> bool {
     entries.find_all(ALONE).any(|entry| entry.is_matrix())
 }
 
-/// The lens of one camera, without the number that it has in a pair.
+/// The lens of a single camera, whose entries have no number.
 pub(super) fn lens_alone(entries: &Entries) -> Result<Lens> {
     let expected =
         "the matrix [f 0 cx; 0 f cy; 0 0 1] of one camera; or give Kalibr's chain, or the file of an OAK";
@@ -206,7 +206,7 @@ pub(super) fn lens_alone(entries: &Entries) -> Result<Lens> {
     Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
 }
 
-/// Whether the lenses are fisheyes. Files of OpenCV do not say so by themselves; see the guide.
+/// Whether the lenses are fisheyes. OpenCV's files do not tell by themselves; see the guide.
 pub(super) fn is_fisheye(entries: &Entries) -> Result<bool> {
     let mut said: Option<(Entry, bool)> = None;
     let flag = entries.find(FISHEYE).map(|entry| fisheye_flag(&entry).map(|is| (entry, Some(is))));
@@ -275,7 +275,7 @@ pub(super) fn rotation_to(entries: &Entries, other: &str) -> Result<Matrix> {
     }
 }
 
-/// How the right camera stands to the left one.
+/// The pose of the right camera relative to the left one.
 pub(super) fn pose(entries: &Entries) -> Result<Pose> {
     let rotation = rotation_to(entries, "the right one")?;
     let expected = "3 numbers, the left camera in the frame of the right one";
@@ -287,11 +287,11 @@ pub(super) fn pose(entries: &Entries) -> Result<Pose> {
     Ok(Pose { rotation, translation })
 }
 
-fn views(entries: &Entries) -> Result<Views> {
+fn views(entries: &Entries) -> Result<RectifiedViews> {
     let mut rotations = [IDENTITY; 2];
     let mut projections = Vec::new();
     for (view, rotation) in rotations.iter_mut().enumerate() {
-        // Images that are rectified already have none.
+        // Rectified images have no rotation.
         if let Some(entry) = entries.find(RECTIFICATION[view]) {
             *rotation = entry.rotation(&entry.matrix()?)?;
         }
@@ -301,14 +301,14 @@ fn views(entries: &Entries) -> Result<Views> {
     }
     let entry = entries.require(PROJECTION[1], "P2", "")?;
     let size = entries.find(NEW_SIZE).map(|entry| entry.size()).transpose()?;
-    Ok(Views { size, ..rectified(&entry, rotations, [projections[0], projections[1]])? })
+    Ok(RectifiedViews { size, ..rectified(&entry, rotations, [projections[0], projections[1]])? })
 }
 
 /// A rectified camera.
 #[derive(Clone, Copy)]
 pub(super) struct Projection {
     pub(super) camera: Camera,
-    /// Where the origin is in its frame, across and down: the fourth column of its matrix by the focal length.
+    /// The origin (x, y) in the camera's frame: the fourth column of its matrix divided by the focal length.
     pub(super) offset: [f64; 2],
 }
 
@@ -322,12 +322,12 @@ pub(super) fn projection(entry: &Entry) -> Result<Projection> {
     }
 }
 
-/// The rectification of two projections; `entry` is the second one.
+/// The rectification by two projections; `entry` is the second one, for errors.
 pub(super) fn rectified(
     entry: &Entry,
     rotations: [Matrix; 2],
     [left, right]: [Projection; 2],
-) -> Result<Views> {
+) -> Result<RectifiedViews> {
     let [a, b] = [left.camera, right.camera];
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-3 * (1.0 + a.abs());
     let translation: [f64; 2] = std::array::from_fn(|i| right.offset[i] - left.offset[i]);
@@ -341,5 +341,5 @@ pub(super) fn rectified(
     if translation.iter().all(|v| *v == 0.0) {
         return Err(entry.wrong("focal length times baseline in its fourth column"));
     }
-    Ok(Views { rotations, cameras: [a, b], translation, size: None })
+    Ok(RectifiedViews { rotations, cameras: [a, b], translation, size: None })
 }

@@ -1,6 +1,6 @@
-//! The settings of ORB-SLAM3, and of ORB-SLAM2 where its pair is rectified already.
+//! The settings of ORB-SLAM3, and those of ORB-SLAM2 for rectified pairs.
 
-use super::cameras::{StereoCalibration, Views};
+use super::cameras::{RectifiedViews, StereoCalibration};
 use super::lens::{Distortion, Lens, RadialTangential};
 use super::models::Model;
 use super::node::Entries;
@@ -9,7 +9,7 @@ use super::posed::apart;
 use crate::error::Result;
 use crate::image::calib::{Camera, Unit};
 
-/// Whether these entries are such settings. Those of ORB-SLAM2 that name lenses have OpenCV's matrices.
+/// Whether the file is such settings. Those of ORB-SLAM2 with lenses have OpenCV's matrices instead.
 pub(super) fn is(entries: &Entries) -> bool {
     entries.find("camera1.fx camera.bf").is_some() && !opencv::has_lens(entries)
 }
@@ -21,13 +21,13 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     if entries.find("camera1.fx").is_none() {
         let camera = camera(entries, "Camera")?;
         let baseline = entries.above_0("camera.bf", "Camera.bf")? / camera.focal_length[0];
-        calibration.views = Some(Views::of_rectified(camera, baseline));
+        calibration.views = Some(RectifiedViews::of_rectified(camera, baseline));
         return Ok(calibration);
     }
     let entry = entries.require("camera.type", "Camera.type", "PinHole, KannalaBrandt8 or Rectified")?;
     if entry.word()?.eq_ignore_ascii_case("rectified") {
         let baseline = entries.above_0("stereo.b", "Stereo.b")?;
-        calibration.views = Some(Views::of_rectified(camera(entries, "Camera1")?, baseline));
+        calibration.views = Some(RectifiedViews::of_rectified(camera(entries, "Camera1")?, baseline));
         return Ok(calibration);
     }
     let fisheye = match Model::of(&entry) {

@@ -1,9 +1,9 @@
-//! `ost.txt`, in which ROS's `camera_calibration` saves one camera, or both of a pair.
+//! `ost.txt`, in which ROS's `camera_calibration` saves one camera or a pair.
 
 use super::node::Node;
 use crate::text::quoted;
 
-/// Its entries, each with the name that `camera_info` has for it.
+/// The entries, each with its name in `camera_info`.
 const ENTRIES: [(&str, &str); 6] = [
     ("width", "image_width"),
     ("height", "image_height"),
@@ -19,7 +19,7 @@ pub(super) fn is(text: &str) -> bool {
         || text.starts_with("[image]") && text.lines().any(|line| line.trim() == "camera matrix")
 }
 
-/// Its cameras, with the entries of `camera_info`. The error is one line.
+/// The cameras, with the entries of `camera_info`. The error is one line.
 pub(super) fn parse(text: &str) -> Result<Vec<Node>, String> {
     let mut cameras: Vec<Vec<(String, Node)>> = Vec::new();
     for (i, line) in text.lines().map(str::trim).enumerate() {
@@ -47,7 +47,7 @@ pub(super) fn parse(text: &str) -> Result<Vec<Node>, String> {
     Ok(cameras.into_iter().map(with_model).collect())
 }
 
-/// Fisheyes have 4 coefficients, and other lenses 5 or more.
+/// Adds the model: fisheyes have 4 coefficients, other lenses 5 or more.
 fn with_model(mut camera: Vec<(String, Node)>) -> Node {
     let fisheye = camera.iter().any(|(name, node)| {
         name == ENTRIES[3].1 && matches!(node, Node::Scalar(text) if text.split_whitespace().count() == 4)

@@ -1,4 +1,4 @@
-//! A file for the lens of each camera, the left one first, and one that says how the cameras stand.
+//! A file for the lens of each camera, the left one first, and a file with their pose.
 
 use super::cameras::{Pose, StereoCalibration};
 use super::node::Entries;
@@ -6,7 +6,7 @@ use super::opencv;
 use super::posed::{Posed, pair};
 use crate::error::{Error, Result};
 
-/// What these files say together; `None` where none of them has a lens of one camera, or a pose alone.
+/// Reads the files together; `None` if none of them has the lens of a single camera or only a pose.
 pub(super) fn read(files: &[Entries]) -> Option<Result<StereoCalibration>> {
     let lenses: Vec<&Entries> = files.iter().filter(|file| opencv::has_lens_alone(file)).collect();
     let poses: Vec<&Entries> = files.iter().filter(|file| opencv::has_pose(file)).collect();

@@ -1,4 +1,4 @@
-//! Cameras that a file places in a frame of the rig, such as that of an inertial sensor.
+//! Cameras whose poses a file gives in a frame of the rig, such as that of an inertial sensor.
 
 use super::cameras::{Pose, StereoCalibration};
 use super::lens::Lens;
@@ -13,11 +13,11 @@ pub(super) struct Posed<'a> {
     pub(super) size: Option<(usize, usize)>,
     /// From the frame of the rig to that of the camera.
     pub(super) pose: Pose,
-    /// What says the pose.
+    /// The entry of the pose.
     pub(super) entry: Entry<'a>,
 }
 
-/// The calibration of two of them.
+/// The calibration of a pair of such cameras.
 pub(super) fn pair(left: &Posed, right: &Posed, unit: Unit) -> Result<StereoCalibration> {
     let pose = Pose::between(&left.pose, &right.pose);
     apart(&right.entry, &pose)?;
@@ -31,7 +31,7 @@ pub(super) fn pair(left: &Posed, right: &Posed, unit: Unit) -> Result<StereoCali
     })
 }
 
-/// An error about `entry` where both cameras are in one place.
+/// An error about `entry` if both cameras are in one place.
 pub(super) fn apart(entry: &Entry, pose: &Pose) -> Result<()> {
     if length(pose.translation) == 0.0 {
         return Err(entry.error("puts both cameras in one place; expected a translation other than 0"));

@@ -1,15 +1,15 @@
-//! The calibration of RealSense cameras, as their viewer saves it in JSON: that of the views that the camera rectifies, at each of its
-//! sizes.
+//! The calibration of RealSense cameras, saved as JSON by their viewer: that of the rectified views, at each
+//! image size.
 
-use super::cameras::{StereoCalibration, Views};
+use super::cameras::{RectifiedViews, StereoCalibration};
 use super::node::Entries;
 use crate::error::Result;
 use crate::image::calib::{Camera, Unit};
 
-/// A camera has a dozen sizes, and their numbers may have gaps.
+/// More than the image sizes of a camera, whose numbers may have gaps.
 const MOST_SIZES: usize = 64;
 
-/// Whether these entries are such a file's.
+/// Whether the file is RealSense's.
 pub(super) fn is(entries: &Entries) -> bool {
     entries.find("baseline").is_some() && entries.find("rectified.0.fx").is_some()
 }
@@ -25,7 +25,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
         let name = |end: &str| format!("rectified.{i}.{end}");
         let Some(width) = entries.find(&name("width")) else { continue };
         let number = |end: &str| entries.number(&name(end), &name(end));
-        // One that the camera has not has no width or no focal length.
+        // Sizes that the camera lacks have no width or no focal length.
         if width.number()? == 0.0 || number("fx")? == 0.0 {
             continue;
         }
@@ -36,7 +36,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
             principal_point: [number("ppx")?, number("ppy")?],
         };
         sizes.push(StereoCalibration {
-            views: Some(Views::of_rectified(camera, baseline)),
+            views: Some(RectifiedViews::of_rectified(camera, baseline)),
             size: Some((width.count()?, height.count()?)),
             unit: Unit::Millimetre,
             ..StereoCalibration::default()

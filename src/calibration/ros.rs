@@ -1,4 +1,4 @@
-//! ROS's `camera_info`, one file for each camera, as `camera_calibration` saves it or as `rostopic echo` prints it.
+//! ROS's `camera_info`, one file for each camera, as saved by `camera_calibration` or printed by `rostopic echo`.
 
 use super::cameras::StereoCalibration;
 use super::lens::Lens;
@@ -14,7 +14,7 @@ const DISTORTION: &str = "distortioncoefficients d";
 const RECTIFICATION: &str = "rectificationmatrix r";
 const PROJECTION: &str = "projectionmatrix p";
 
-/// Whether these entries are those of one camera.
+/// Whether the file is of one camera.
 pub(super) fn is(entries: &Entries) -> bool {
     entries.find(CAMERA).is_some()
         && (entries.find(PROJECTION).is_some() || entries.find("distortionmodel").is_some())
@@ -27,7 +27,7 @@ struct Info {
     size: (usize, usize),
 }
 
-/// The calibration of two cameras in any order: the left one is that whose projection has no offset.
+/// The calibration of two cameras in any order: the projection of the left one has no offset.
 pub(super) fn read(cameras: [&Entries; 2]) -> Result<StereoCalibration> {
     let [first, second] = [info(cameras[0])?, info(cameras[1])?];
     let is_left = |info: &Info| info.projection.offset.iter().all(|v| *v == 0.0);
@@ -57,7 +57,7 @@ pub(super) fn read(cameras: [&Entries; 2]) -> Result<StereoCalibration> {
     .with_pose_of_views())
 }
 
-/// What a driver reads out of the sensor: every so many pixels of a region.
+/// The region of the sensor that a driver reads, and its binning.
 struct Region {
     offset: [f64; 2],
     size: (usize, usize),
@@ -65,8 +65,8 @@ struct Region {
 }
 
 impl Region {
-    /// By `roi`, `binning_x` and `binning_y`, of a `sensor` of this size. 0 means all of it, and every pixel.
-    fn of(entries: &Entries, sensor: (usize, usize)) -> Result<Self> {
+    /// From `roi`, `binning_x` and `binning_y`, for a `sensor` of this size. 0 means all, and every pixel.
+    fn read(entries: &Entries, sensor: (usize, usize)) -> Result<Self> {
         let count = |of: &Entries, names: &str| Ok::<_, Error>(of.number_or_zero(names)? as usize);
         let binning = [count(entries, "binningx")?.max(1), count(entries, "binningy")?.max(1)];
         let mut region = Self { offset: [0.0; 2], size: sensor, binning };
@@ -98,7 +98,7 @@ impl Region {
         (self.size.0 / self.binning[0], self.size.1 / self.binning[1])
     }
 
-    /// The camera as its images have it, of that of the whole sensor.
+    /// The camera of the region's images, from that of the whole sensor.
     fn camera(&self, Camera { focal_length, principal_point }: Camera) -> Camera {
         let by = self.binning.map(|by| by as f64);
         Camera {
@@ -112,7 +112,7 @@ fn info(entries: &Entries) -> Result<Info> {
     let matrix = entries.require(CAMERA, "camera_matrix", "a matrix of 3 x 3")?;
     let (focal_length, principal_point) = opencv::camera(&matrix)?;
     let expected = "plumb_bob, rational_polynomial or equidistant";
-    // Older files do not say it.
+    // Older files lack it.
     let model = entries.find("distortionmodel");
     let entry = entries.require(DISTORTION, "distortion_coefficients", "those of the lens")?;
     let fisheye = match model.as_ref().map(|entry| Model::of(entry)) {
@@ -123,7 +123,7 @@ fn info(entries: &Entries) -> Result<Info> {
     let distortion = opencv::distortion(&entry, "the coefficients of the distortion", fisheye)?;
     let count = |names: &str, called| entries.require(names, called, "a number of pixels")?.count();
     let size = (count("imagewidth width", "image_width")?, count("imageheight height", "image_height")?);
-    let region = Region::of(entries, size)?;
+    let region = Region::read(entries, size)?;
     let camera = region.camera(Camera { focal_length, principal_point });
     let lens = Lens::new(camera.focal_length, camera.principal_point, distortion);
     let rotation = entries.require(RECTIFICATION, "rectification_matrix", "a rotation of 3 x 3")?;

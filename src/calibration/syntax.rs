@@ -1,4 +1,4 @@
-//! YAML, JSON, XML and INI, as calibration programs write them.
+//! Parses YAML, JSON, XML and INI in the dialects of calibration programs.
 
 use std::fmt;
 use std::path::Path;
@@ -11,7 +11,7 @@ use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use super::node::{MAX_DEPTH, MAX_ENTRIES, Node};
 use crate::text::{one_line, quoted};
 
-/// Whether a text is YAML for certain: by how it begins, by the name of its file, or by an entry that calibrations have.
+/// Whether a text is certainly YAML: by its start, by the name of its file, or by a typical entry of calibrations.
 pub(super) fn is_yaml(path: &Path, text: &str) -> bool {
     const STEMS: [&str; 13] = [
         "K1",
@@ -46,11 +46,11 @@ pub(super) fn is_json(text: &str) -> bool {
     text[1..].trim_start().starts_with(['"', '}'])
 }
 
-/// A YAML file of one document, or of several that say the same, as `rostopic echo` prints them. The error is one line.
+/// A YAML file of one document, or of several equal ones as `rostopic echo` prints them. The error is one line.
 pub(super) fn yaml(text: &str) -> Result<Node, String> {
     let mut all = documents(text)?.into_iter();
     let Some(first) = all.next() else { return Err("is no YAML with entries; is it a calibration?".into()) };
-    // The header of a message has its time.
+    // The header of a message has a time stamp.
     let entries = |node: &Node| match node {
         Node::Map(entries) => entries.iter().filter(|(name, _)| name != "header").cloned().collect(),
         other => vec![(String::new(), other.clone())],
@@ -63,11 +63,11 @@ pub(super) fn yaml(text: &str) -> Result<Node, String> {
 }
 
 fn documents(text: &str) -> Result<Vec<Node>, String> {
-    // OpenCV's own form of the directive, which is no YAML.
+    // OpenCV's form of the directive is not valid YAML.
     let rest = text.strip_prefix("%YAML:1.0").unwrap_or(text);
-    // OpenCV needs no blank before a list.
+    // OpenCV writes no blank before a list.
     let rest = &rest.replace(":[", ": [");
-    // Groups that are open, each with the key that its next value has.
+    // The open groups, each with the key of its next value.
     let mut open: Vec<(Node, Option<String>)> = Vec::new();
     let mut found: Vec<Node> = Vec::new();
     for event in Parser::new_from_str(rest) {
@@ -155,7 +155,7 @@ impl<'de> Visitor<'de> for JsonVisitor {
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<Json, E> {
-        // As many digits as give the same number again.
+        // As few digits as identify the number.
         Ok(Json(Node::Scalar(format!("{value:?}"))))
     }
 
@@ -222,9 +222,9 @@ pub(super) fn ini(text: &str) -> Result<Node, String> {
     Ok(Node::Map(sections))
 }
 
-/// An XML file: elements are entries, and elements called `_` a list. The error is one line.
+/// An XML file: elements are entries, and elements named `_` make a list. The error is one line.
 pub(super) fn xml(text: &str) -> Result<Node, String> {
-    // Nesting is bounded before anything goes down it.
+    // The parser bounds the nesting.
     let options = ParsingOptions { nodes_limit: 100_000, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options)
         .map_err(|e| format!("is no XML: {}", one_line(&e.to_string())))?;

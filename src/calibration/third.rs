@@ -1,4 +1,4 @@
-//! A third camera: one beside the pair, such as the colour camera of a rig, and how it stands to the left one.
+//! A third camera beside the pair, such as the colour camera of a rig, and its pose relative to the left one.
 
 use std::path::Path;
 
@@ -8,8 +8,8 @@ use super::{depthai, in_form, kalibr, opencv, root, text};
 use crate::error::{Error, Result};
 use crate::image::read::MAX_PIXELS;
 
-/// Reads a third camera from a file: one camera by OpenCV's names (K, D, R, T and `image_size`, or those of ROS's `camera_info`), the last
-/// camera of Kalibr's chain, or the camera of an OAK's calibration that is not one of its pair.
+/// Reads a third camera from a file: a camera with OpenCV's names (K, D, R, T and `image_size`, or those of
+/// ROS's `camera_info`), the last camera of Kalibr's chain, or the camera of an OAK that is not one of its pair.
 ///
 /// # Errors
 /// [`Error::Read`] when the file cannot be read, or an entry is wrong or missing; the error names the file and the entry.
@@ -17,10 +17,10 @@ pub fn read(file: &Path) -> Result<ThirdCamera> {
     of_text(file, &text(file)?)
 }
 
-/// As [`read`], of a file that is in memory, which errors call `name`.
+/// Like [`read`], for a text in memory, which errors call `name`.
 ///
 /// # Errors
-/// Those of [`read`].
+/// The errors of [`read`].
 pub fn of_text(name: &Path, text: &str) -> Result<ThirdCamera> {
     let root = root(name, text)?;
     let entries = Entries::new(vec![(name, &root)]);
@@ -39,7 +39,7 @@ pub fn of_text(name: &Path, text: &str) -> Result<ThirdCamera> {
     Ok(camera)
 }
 
-/// By OpenCV's names, without the number that they have in a pair.
+/// A camera with OpenCV's names for a single one.
 fn one(entries: &Entries) -> Result<ThirdCamera> {
     let lens = opencv::lens_alone(entries)?;
     let size = opencv::size(entries)?.ok_or_else(|| {
@@ -48,11 +48,11 @@ fn one(entries: &Entries) -> Result<ThirdCamera> {
     Ok(ThirdCamera { lens, pose: pose(entries)?, size, unit: opencv::unit(entries)? })
 }
 
-/// From the left camera. The third one may stand in its place.
+/// The pose relative to the left camera. The third camera may be at the same place.
 fn pose(entries: &Entries) -> Result<Pose> {
     let expected = "3 numbers, the left camera in the frame of this one";
     let translation = entries.require(opencv::TRANSLATION, "T", expected)?;
-    // Both in one matrix.
+    // R and T in one matrix.
     if entries.find(opencv::ROTATION).is_none() && translation.numbers::<16>(expected).is_ok() {
         return translation.pose();
     }

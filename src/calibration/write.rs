@@ -1,11 +1,11 @@
-//! The calibration of a rectified pair as text, for OpenCV and in Middlebury's form.
+//! Writes the calibration of a rectified pair for OpenCV and in Middlebury's form.
 
 use std::fmt::Write;
 
 use super::matrix::{IDENTITY, Matrix};
 use crate::image::calib::{Calibration, Camera, Unit};
 
-/// `calib.txt`, in millimetres where the unit is known; else it says that it is not. `None` where a camera is missing.
+/// `calib.txt` in millimetres; if the unit is unknown, it says so. `None` if a camera is missing.
 #[must_use]
 pub fn middlebury(calibration: &Calibration) -> Option<String> {
     let (cameras, baseline) = calibration.cameras()?;
@@ -28,9 +28,9 @@ pub fn middlebury(calibration: &Calibration) -> Option<String> {
     Some(text)
 }
 
-/// OpenCV's YAML: the cameras of the rectified images, which have no distortion and the same orientation, and the
-/// rectification of these, which changes nothing. `rotations` lead from each real camera to its rectified view; OpenCV has no
-/// name for them here. `None` where a camera is missing.
+/// OpenCV's YAML: the cameras of the rectified images, which have no distortion and one orientation, and
+/// their rectification, which is the identity. `rotations`, from each real camera to its rectified view, have
+/// no OpenCV name and are called `fromRaw`. `None` if a camera is missing.
 #[must_use]
 pub fn opencv(calibration: &Calibration, rotations: &[Matrix; 2]) -> Option<String> {
     let (cameras, baseline) = calibration.cameras()?;
@@ -67,7 +67,7 @@ pub fn opencv(calibration: &Calibration, rotations: &[Matrix; 2]) -> Option<Stri
 fn matrix(text: &mut String, name: &str, rows: &[&[f64]]) {
     let (height, width) = (rows.len(), rows[0].len());
     let _ = writeln!(text, "{name}: !!opencv-matrix\n   rows: {height}\n   cols: {width}\n   dt: d");
-    // As few digits as give the same number again; `{:?}` has a point or an exponent, as OpenCV expects.
+    // As few digits as identify the number; `{:?}` has a point or an exponent, as OpenCV expects.
     let rows = rows.iter().map(|row| row.iter().map(|v| format!("{v:?}")).collect::<Vec<_>>().join(", "));
     let _ = writeln!(text, "   data: [ {} ]", rows.collect::<Vec<_>>().join(",\n       "));
 }
@@ -80,7 +80,7 @@ mod tests {
     use crate::calibration::of_texts;
 
     #[test]
-    fn what_is_written_is_read_again() {
+    fn written_calibrations_are_read_back() {
         for unit in [Unit::Metre, Unit::Millimetre, Unit::Unknown] {
             let calibration = Calibration {
                 camera: Some(Camera { focal_length: [501.25, 501.25], principal_point: [319.5, 1.0 / 3.0] }),

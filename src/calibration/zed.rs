@@ -1,4 +1,4 @@
-//! The calibration file of ZED cameras, which has the lenses at each of their sizes.
+//! The calibration file of ZED cameras, with the lenses at each image size.
 
 use super::cameras::{Pose, StereoCalibration};
 use super::lens::{Distortion, Lens, RadialTangential};
@@ -8,7 +8,7 @@ use super::posed::apart;
 use crate::error::{Error, Result};
 use crate::image::calib::Unit;
 
-/// Names of sizes.
+/// The names of the image sizes.
 const SIZES: [(&str, (usize, usize)); 8] = [
     ("4k", (3840, 2160)),
     ("qhdplus", (3200, 1800)),
@@ -20,7 +20,7 @@ const SIZES: [(&str, (usize, usize)); 8] = [
     ("vga", (672, 376)),
 ];
 
-/// Whether these entries are such a file's, or that of one such camera.
+/// Whether the file is of a ZED camera, of two lenses or of one.
 pub(super) fn is(entries: &Entries) -> bool {
     let lens = |name: &str| ["leftcam", "rightcam", "cam"].iter().any(|stem| name.starts_with(stem));
     let stereo = entries.find("stereo").and_then(|entry| entry.group().ok());
@@ -42,21 +42,21 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     let known = || SIZES.map(|(name, _)| name.to_uppercase()).join(", ");
     StereoCalibration::of_sizes(sizes).ok_or_else(|| {
         let reason = format!(
-            "has no lenses of a pair: expected LEFT_CAM_ and RIGHT_CAM_ with {} behind it; give the file of both cameras",
+            "has no lenses of a pair: expected LEFT_CAM_ and RIGHT_CAM_ followed by {}; give the file of both cameras",
             known()
         );
         Error::read(entries.path(), reason)
     })
 }
 
-/// The calibration for images of `size`, which sections call `name`.
+/// The calibration for images of `size`, whose sections are called `name`.
 fn of_size(entries: &Entries, name: &str, size: (usize, usize)) -> Result<StereoCalibration> {
     let lens = |side: &str| {
         let called = format!("{}_CAM_{}", side.to_uppercase(), name.to_uppercase());
         let entry = entries.require(&section(side, name), &called, "the numbers of a lens")?;
         let numbers = entry.group()?;
         let number = |name: &str| numbers.number(name, name);
-        // Newer files have one model for all sizes, which counts where an older one is there too.
+        // Newer files have one model for all sizes. It takes precedence over an older one.
         let of_all = entries.find(&format!("{side}disto")).map(|entry| entry.group()).transpose()?;
         let distortion = distortion(of_all.as_ref().unwrap_or(&numbers))?;
         let wrong = |_| entry.error("has a focal length that is not above 0; calibrate again");
@@ -67,10 +67,10 @@ fn of_size(entries: &Entries, name: &str, size: (usize, usize)) -> Result<Stereo
     let of_this = |stem: &str| {
         stereo.number(&format!("{stem}{name}"), &format!("{}_{}", stem.to_uppercase(), name.to_uppercase()))
     };
-    // Some files have one for all sizes.
+    // Some files have one value for all sizes.
     let moved = |stem: &str| stereo.number_or_zero(&format!("{stem}{name} {stem}"));
     let turn = [of_this("rx")?, of_this("cv")?, of_this("rz")?];
-    // The maker's calibration tools write T of OpenCV so: its first number with the other sign, and the others as they are.
+    // Stereolabs' calibration tools write OpenCV's T like this: the first number negated, the others as they are.
     let translation = [-stereo.number("baseline", "Baseline")?, moved("ty")?, moved("tz")?];
     let pose = Pose { rotation: rotation(turn), translation };
     apart(&entry, &pose)?;
@@ -83,7 +83,7 @@ fn of_size(entries: &Entries, name: &str, size: (usize, usize)) -> Result<Stereo
     })
 }
 
-/// The distortion in a section. For fisheyes k1 to k4 are given, and all other coefficients are 0.
+/// The distortion in a section. Fisheyes have k1 to k4, and all other coefficients are 0.
 fn distortion(section: &Entries) -> Result<Distortion> {
     let c = |name: &str| section.number_or_zero(name);
     let [k1, k2, k3, k4] = [c("k1")?, c("k2")?, c("k3")?, c("k4")?];

@@ -1,4 +1,4 @@
-//! Runs the list of a match on a backend, with progress, cancelling, inspection and times.
+//! Runs the steps of a match on a backend, with progress, cancelling, inspection and timing.
 
 mod double_size;
 mod mosaic;
@@ -19,28 +19,28 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 use web_time::Instant;
 
-/// What a match leaves behind.
+/// The result of a match.
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// The maps.
     pub maps: Maps,
     /// Iterations done, of all phases together; the most of any tile.
     pub iterations: u32,
-    /// What was corrected in the pair.
+    /// The corrections that were made to the pair.
     pub conditioning: Conditioning,
-    /// What the host did around the stages, and how long it took.
+    /// The host steps around the stages, each with its time.
     pub host_times: Vec<(&'static str, Duration)>,
-    /// The time of every stage that ran on the maps of all tiles.
+    /// The time of every stage that ran on the merged maps of all tiles.
     pub mosaic_times: Vec<(Stage, Duration)>,
-    /// What went through the device.
+    /// Data that went through the device.
     pub traffic: Traffic,
-    /// [`Backend::cells`] of each level, at the pair's own size; those of all tiles together.
+    /// [`Backend::cells`] of each level at the pair's own size, summed over all tiles.
     pub cells: Vec<u64>,
 }
 
-/// What an inspector sees of a match on its way.
+/// An event of a running match, for an inspector.
 pub enum Inspection<'a> {
-    /// The pair as it is matched, with what follows from it.
+    /// The prepared pair, with the data derived from it.
     Prepared(&'a Prepared),
     /// A stage has run.
     Stage(&'a mut dyn Backend, Stage),
@@ -48,15 +48,15 @@ pub enum Inspection<'a> {
     Iteration(&'a mut dyn Backend, u32),
 }
 
-/// Looks into a match on its way, for diagnosis: it may read any volume and map, at the price of time.
+/// Inspects a running match for diagnosis: it may read any volume and map, which takes time.
 pub type Inspector<'a> = &'a mut (dyn FnMut(&mut Inspection) -> Result<()> + Send);
 
-/// Matches `pair` by `program` on `backend`; `observer` hears of progress, and `inspector`, if any, looks into the match of the pair
-/// at its own size.
+/// Matches `pair` by `program` on `backend`. `observer` receives progress, and `inspector`, if any, inspects
+/// the match of the pair at its own size.
 ///
 /// # Errors
-/// Whatever the backend reports, [`crate::Error::Mismatch`] when the program is for another size, [`crate::Error::Interrupted`]
-/// when `observer` breaks, and those of `inspector`.
+/// The errors of the backend, [`crate::Error::Mismatch`] when the program is for another size,
+/// [`crate::Error::Interrupted`] when `observer` breaks, and those of `inspector`.
 pub async fn solve(
     backend: &mut dyn Backend,
     program: &Program,
@@ -64,47 +64,47 @@ pub async fn solve(
     observer: Observer<'_>,
     inspector: Option<Inspector<'_>>,
 ) -> Result<Solution> {
-    let mut started = Match::new(backend, program, inspector.is_some());
+    let mut started = MatchRun::new(backend, program, inspector.is_some());
     started.advance(backend, pair, observer, inspector, None).await?;
     Ok(started.solution())
 }
 
-/// As [`solve`], but only as far as nothing has to be waited for: the next match may be started on the backend before [`finish`]
-/// ends this one, where the [list waits once](Program::waits_once).
+/// Like [`solve`], but returns before the first step that waits for the device. If the [program waits
+/// once](Program::waits_once), the next match may be started on the backend before [`finish`] completes this one.
 ///
 /// # Errors
-/// Those of [`solve`].
+/// The errors of [`solve`].
 pub async fn start(
     backend: &mut dyn Backend,
     program: &Program,
     pair: &Pair,
     observer: Observer<'_>,
-) -> Result<Match> {
-    let mut started = Match::new(backend, program, false);
+) -> Result<MatchRun> {
+    let mut started = MatchRun::new(backend, program, false);
     started.advance(backend, pair, observer, None, Some(Step::Collect)).await?;
     Ok(started)
 }
 
-/// Ends a match of `pair` that was started on `backend`.
+/// Completes a match of `pair` that was started on `backend`.
 ///
 /// # Errors
-/// Whatever the backend reports.
-pub async fn finish(backend: &mut dyn Backend, mut started: Match, pair: &Pair) -> Result<Solution> {
+/// The errors of the backend.
+pub async fn finish(backend: &mut dyn Backend, mut started: MatchRun, pair: &Pair) -> Result<Solution> {
     let quiet = &mut |_: Progress| ControlFlow::Continue(());
     started.advance(backend, pair, quiet, None, None).await?;
     Ok(started.solution())
 }
 
-/// A match on its way through its list.
-pub struct Match {
+/// A match that is running through its steps.
+pub struct MatchRun {
     program: Program,
     /// The next step.
     next: usize,
     followed: Followed,
-    /// The pair that is matched, and the part of it that the backend has.
+    /// The pair that is matched, and the part of it that the backend holds.
     pair: Option<Pair>,
     part: Option<Pair>,
-    /// The frame that was entered last, and whether what the backend did for it is still to be counted.
+    /// The frame that was entered last, and whether the backend's work for it has been counted.
     frame: usize,
     is_counted: bool,
     /// The frame of the whole image.
@@ -115,15 +115,15 @@ pub struct Match {
     /// Whether the pair is at twice its size.
     doubled: bool,
     mosaic: Option<Mosaic>,
-    /// Once all tiles are in place: what runs the stages on the maps of the whole image, and the disparities of the right view.
+    /// After all tiles: the CPU path for the stages on whole maps, and the disparities of the right view.
     gathered: Option<(Cpu, Plane<i32>)>,
     tickets: Vec<(View, Ticket)>,
-    /// What has been found so far.
+    /// The maps that were found so far.
     found: Option<Maps>,
     solution: Partial,
 }
 
-/// What a [`Solution`] is made of.
+/// The parts of a [`Solution`] that are complete.
 #[derive(Default)]
 struct Partial {
     /// The maps at the pair's own size, while it is matched at twice its size.
@@ -135,9 +135,9 @@ struct Partial {
     cells: Vec<u64>,
 }
 
-impl Match {
+impl MatchRun {
     fn new(backend: &mut dyn Backend, program: &Program, inspected: bool) -> Self {
-        // Who looks in sees whole levels, one after the other.
+        // An inspected match runs the unfused program, so that the inspector sees complete levels.
         let program = if inspected { program.clone() } else { backend.fit(program.clone()) };
         let followed = Followed::new(program.work());
         Self {
@@ -194,7 +194,7 @@ impl Match {
             self.step(step, backend, original, &mut watch, inspector).await?;
         }
         if until.is_some() {
-            // The next match may go to the backend before this one ends.
+            // The next match may use the backend before this one is completed.
             self.leave(backend);
         }
         self.followed = watch.followed;
@@ -259,7 +259,7 @@ impl Match {
                 self.iterations += 1;
                 inspect(&mut Inspection::Iteration(backend, self.iterations))?;
             }
-            // Who looks in sees no idle iterations, at the price of time.
+            // With an inspector, wait for convergence, so that no idle iteration is reported.
             Step::Settled => {
                 if backend.settled(looks_in).await? {
                     let rest = &self.program.steps[self.next..];
@@ -329,7 +329,7 @@ impl Match {
         self.pair.as_ref().expect("the pair was conditioned")
     }
 
-    /// What runs the stages.
+    /// The backend that runs the next stages.
     fn target<'a>(&'a mut self, backend: &'a mut dyn Backend) -> &'a mut dyn Backend {
         match &mut self.gathered {
             Some((cpu, _)) => cpu,
@@ -337,7 +337,7 @@ impl Match {
         }
     }
 
-    /// Counts what the backend did for the frame that was entered last.
+    /// Counts the backend's work for the frame that was entered last.
     fn leave(&mut self, backend: &dyn Backend) {
         if std::mem::replace(&mut self.is_counted, true) {
             return;
@@ -352,7 +352,7 @@ impl Match {
     }
 }
 
-/// The part of `pair` that `frame` is, if the memory holds a copy.
+/// The part of `pair` that belongs to `frame`, if the memory holds a copy.
 fn part(pair: &Pair, frame: &Frame) -> Result<Pair> {
     let copy = |make: &dyn Fn() -> Pair| {
         memory::check(frame.plan.pair_bytes(), Purpose::Match)?;
@@ -362,7 +362,7 @@ fn part(pair: &Pair, frame: &Frame) -> Result<Pair> {
     if frame.mirrored { copy(&|| crop.mirrored()) } else { Ok(crop) }
 }
 
-/// The maps that were asked for, and how many iterations were idle.
+/// The requested maps, and the number of idle iterations.
 async fn collect(backend: &mut dyn Backend, tickets: Vec<(View, Ticket)>) -> Result<(Maps, u32)> {
     let mut all: Option<(Maps, u32)> = None;
     for (_, ticket) in tickets {
@@ -375,11 +375,11 @@ async fn collect(backend: &mut dyn Backend, tickets: Vec<(View, Ticket)>) -> Res
     Ok(all.expect("the left view was asked for"))
 }
 
-/// The map of the right view, from maps of what is mirrored.
+/// The map of the right view, from the maps of the mirrored pair.
 fn right_map(maps: Maps) -> RightMap {
     RightMap {
         disparity: maps.disparity.mirrored(),
-        // How far a runner-up is behind is not known.
+        // The runner-up of a right pixel is unknown.
         validity: maps.validity.mirrored().map(|validity| validity & !flag::LOW_CONFIDENCE),
     }
 }

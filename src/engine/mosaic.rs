@@ -1,4 +1,4 @@
-//! The maps of an image that is matched tile by tile.
+//! The maps of an image that is matched in tiles.
 
 use crate::backend::cpu::Cpu;
 use crate::backend::{Backend, Map, NO_LABEL};
@@ -10,15 +10,15 @@ use crate::plan::Plan;
 use crate::program::{Frame, View};
 use crate::stage::MapSet;
 
-/// The maps of a whole image, put together from those of its tiles, without any volume: the stages that follow need none.
+/// The maps of a whole image, assembled from those of its tiles. It has no volumes: the remaining stages need none.
 pub(super) struct Mosaic {
     plan: Plan,
-    /// The pair, as it is matched.
+    /// The pair as it is matched.
     pair: Pair,
     maps: MapSet,
-    /// Disparity of the right view before post-processing, in 1/256 px; empty where its map is not wanted.
+    /// Disparity of the right view before post-processing, in 1/256 px; empty if its map is not wanted.
     right_raw: Plane<i32>,
-    /// Where the last tile sees the right view better than those before.
+    /// Pixels of the right view that the last tile matches better than those before.
     better: Plane<bool>,
 }
 
@@ -45,10 +45,10 @@ impl Mosaic {
         Ok(Self { plan: plan.clone(), pair: pair.clone(), maps, right_raw, better })
     }
 
-    /// Takes over what `frame` leaves of `view` on `backend`, which matched `pair`, its part of the whole one: maps of its core.
+    /// Copies the maps of `view` in the core of `frame` from `backend`, which matched `pair`, the tile's part of the whole pair.
     ///
     /// # Errors
-    /// Those of `backend`.
+    /// The errors of `backend`.
     pub(super) async fn place(
         &mut self,
         frame: &Frame,
@@ -63,7 +63,7 @@ impl Mosaic {
         }
     }
 
-    /// The maps of its core, and where it sees the right view better than the tiles before, that.
+    /// Copies the maps of the core, and the labels of right pixels that this tile matches best so far.
     async fn place_left(&mut self, frame: &Frame, pair: &Pair, backend: &mut dyn Backend) -> Result<()> {
         let Frame { core, crop, .. } = frame;
         let part = core.within(crop);
@@ -87,7 +87,7 @@ impl Mosaic {
             }
         }
         if self.plan.method.front.illumination != Illumination::None {
-            // What follows looks at colours as they were matched.
+            // Later stages use the colours as they were matched.
             let wanted = 1 + usize::from(self.plan.method.refinement.right_map);
             let views = self.pair.views_mut().into_iter().zip([pair.left(), pair.right()]);
             for (whole, matched) in views.take(wanted) {
@@ -97,8 +97,8 @@ impl Mosaic {
         Ok(())
     }
 
-    /// The disparities of the right view that `backend` holds after the views were swapped, where the tile sees that view better
-    /// than the tiles before.
+    /// Copies the disparities of the right view that `backend` holds after the views were swapped, for pixels
+    /// that this tile matches better.
     async fn place_right(&mut self, frame: &Frame, backend: &mut dyn Backend) -> Result<()> {
         let raw = backend.map(Map::Raw).await?.mirrored();
         for (y, row) in frame.crop.y.clone().zip(0..) {
@@ -109,7 +109,7 @@ impl Mosaic {
         Ok(())
     }
 
-    /// The labels of a tile of the mirrored pair, as labels of the right view, and where its map is wanted the disparities.
+    /// Copies the right view's labels from a tile of the mirrored pair, and its disparities if wanted.
     async fn place_mirrored(&mut self, frame: &Frame, backend: &mut dyn Backend) -> Result<()> {
         let Frame { core, crop, .. } = frame;
         let part = core.within(crop);
@@ -121,8 +121,8 @@ impl Mosaic {
         Ok(())
     }
 
-    /// A backend that holds the maps, once all tiles are in place, and the disparities of the right view, if wanted, as they lie in
-    /// that view.
+    /// A backend with the maps, once all tiles are placed, and the disparities of the right view in its own
+    /// orientation, if wanted.
     pub(super) fn gathered(self) -> (Cpu, Plane<i32>) {
         let Self { plan, pair, mut maps, right_raw, .. } = self;
         maps.disparity = maps.raw.clone();
@@ -130,7 +130,7 @@ impl Mosaic {
     }
 }
 
-/// Copies the values of `core`, which is `part` of `from`.
+/// Copies the values of `core`; `part` is the same area in `from`.
 fn copy_part<T: Copy>(to: &mut Plane<T>, from: &Plane<T>, core: &Rect, part: &Rect) {
     for (y, row) in core.y.clone().zip(part.y.clone()) {
         to.row_mut(y)[core.x.clone()].copy_from_slice(&from.row(row)[part.x.clone()]);

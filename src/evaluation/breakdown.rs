@@ -1,5 +1,5 @@
-//! Where the errors of a map are: each pixel with known truth is in one class, by what makes it hard to
-//! match.
+//! Breaks the errors of a map down by class: each pixel with known truth is in one class, by what makes it
+//! hard to match.
 
 use serde::Serialize;
 use serde::ser::Serializer;
@@ -27,7 +27,7 @@ const SLANTED: f64 = 0.2;
 pub enum Class {
     /// Its match, x - truth, lies outside the right image: below 0 or above width - 1.
     Border,
-    /// One view does not see it, by the mask (not 255). Without a mask the class is empty.
+    /// Only one view sees it, by the mask (not 255). Without a mask the class is empty.
     Occluded,
     /// The known truths in the 7 x 7 window around it span more than 4 px.
     Edge,
@@ -61,7 +61,7 @@ impl Class {
 
 /// The errors of one class. A pixel is bad as in `bad2.0`: wrong by more than 2 px, or invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Part {
+pub struct ClassErrors {
     /// Share of all pixels with known truth, in percent; over all classes these add up to 100.
     pub share: f64,
     /// Share of the class's pixels that are bad, in percent; `None` when it has none.
@@ -82,7 +82,7 @@ pub struct Part {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Breakdown {
     /// In the order of [`Class::ALL`].
-    pub parts: [Part; 6],
+    pub parts: [ClassErrors; 6],
 }
 
 impl Serialize for Breakdown {
@@ -93,7 +93,7 @@ impl Serialize for Breakdown {
 
 impl Breakdown {
     /// Every class with its errors.
-    pub fn iter(&self) -> impl Iterator<Item = (Class, &Part)> {
+    pub fn iter(&self) -> impl Iterator<Item = (Class, &ClassErrors)> {
         Class::ALL.into_iter().zip(&self.parts)
     }
 
@@ -108,8 +108,9 @@ impl Breakdown {
             return None;
         }
         let parts = std::array::from_fn(|i| {
-            let every = |field: fn(&Part) -> Option<f64>| average(all.iter().map(|b| field(&b.parts[i])));
-            Part {
+            let every =
+                |field: fn(&ClassErrors) -> Option<f64>| average(all.iter().map(|b| field(&b.parts[i])));
+            ClassErrors {
                 share: every(|p| Some(p.share)).unwrap_or(0.0),
                 bad: every(|p| p.bad),
                 avg: every(|p| p.avg),
@@ -190,7 +191,7 @@ impl GroundTruth {
         if pixels == 0.0 {
             return Err(nothing_known());
         }
-        let parts = tallies.map(|t| Part {
+        let parts = tallies.map(|t| ClassErrors {
             share: 100.0 * t.pixels as f64 / pixels,
             bad: percent(t.bad as f64, t.pixels as f64),
             avg: (t.valid > 0).then(|| t.errors.value() / t.valid as f64),
@@ -355,7 +356,7 @@ mod tests {
         (truth, row(&[128, 128, 128, 0, 255, 255, 255, 255]), chequered(8, 1, |_| 0))
     }
 
-    /// The errors of a map of this case.
+    /// The errors of a map of [`case`].
     fn found() -> Breakdown {
         let (truth, mask, image) = case();
         let estimate = row(&[5.0, 2.0, 6.0, INF, 2.0, 3.0, 4.0, 9.0]);
@@ -396,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn means_add_up_and_say_nothing_of_what_a_pair_lacks() {
+    fn means_add_up_and_omit_what_a_pair_lacks() {
         let (truth, _, image) = case();
         let one = found();
         let perfect = ground(&truth, None).breakdown(&truth, &image).unwrap();
@@ -413,7 +414,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_must_agree_and_something_be_known() {
+    fn sizes_must_agree_and_some_truth_be_known() {
         let (truth, mask, image) = case();
         let masked = ground(&truth, Some(&mask));
         let error = masked.breakdown(&Plane::filled(7, 1, 2.0), &image).unwrap_err().to_string();

@@ -120,7 +120,7 @@ mod tests {
     use super::*;
     use crate::Error;
 
-    /// Pixels that are bad or not, with their confidences.
+    /// The sparsification of pixels that are bad or not, by their confidences.
     fn sparsified(bad: &[bool], confidence: &[u8]) -> Sparsification {
         let estimate: Vec<f32> = bad.iter().map(|&b| if b { 9.0 } else { 4.0 }).collect();
         let truth = row(&vec![4.0; bad.len()]);
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_known_decides() {
+    fn the_perfect_confidence_is_optimal_and_a_constant_one_random() {
         let bad: Vec<bool> = (0..50).map(|i| i % 7 == 3).collect();
         let by = |confidence: fn(bool) -> u8| {
             sparsified(&bad, &bad.iter().map(|&b| confidence(b)).collect::<Vec<_>>())
@@ -163,7 +163,7 @@ mod tests {
         assert_eq!((all.auc, all.optimal, all.random), (100.0, 100.0, 100.0));
     }
 
-    /// Small numbers without a pattern.
+    /// Small pseudo-random numbers.
     fn noise(state: &mut u32) -> u32 {
         *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         *state >> 16
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_must_agree_and_something_be_known() {
+    fn sizes_must_agree_and_some_truth_be_known() {
         let truth = row(&[1.0, 2.0]);
         let error = ground(&truth, None).sparsify(&truth, &row(&[1])).unwrap_err().to_string();
         assert!(error.contains("confidence map is 1 x 1"), "{error}");

@@ -40,11 +40,11 @@ pub struct Metrics {
     /// All quantiles interpolate linearly, as `numpy.quantile` does by default: of n errors in ascending order,
     /// counted from 0, the quantile q is the value at position (n - 1) q, on the line between its two neighbours.
     pub a50: Option<f64>,
-    /// The error that 90 % of the valid pixels stay below, interpolated as in `a50`.
+    /// The error that 90 % of the valid pixels stay below, interpolated like `a50`.
     pub a90: Option<f64>,
-    /// The error that 95 % of the valid pixels stay below, interpolated as in `a50`.
+    /// The error that 95 % of the valid pixels stay below, interpolated like `a50`.
     pub a95: Option<f64>,
-    /// The error that 99 % of the valid pixels stay below, interpolated as in `a50`.
+    /// The error that 99 % of the valid pixels stay below, interpolated like `a50`.
     pub a99: Option<f64>,
 }
 
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mask_selects_what_both_views_see() {
+    fn the_mask_selects_pixels_that_both_views_see() {
         let report = ground(&row(&[1.0, 1.0, INF, 1.0]), Some(&row(&[255, 128, 255, 255])))
             .evaluate(&row(&[1.0, 6.0, 9.0, 2.0]))
             .unwrap();

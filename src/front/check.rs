@@ -1,7 +1,7 @@
 //! Warnings about probable mistakes. Before a pair is matched they come from its pixels and from sparse
 //! matches, which also suggest the range to search; after a match they come from its maps.
 
-use super::matches::{self, Match, Survey};
+use super::matches::{self, SparseMatch, Survey};
 use super::parts;
 pub use super::parts::Part;
 use crate::error::{RangeError, Result};
@@ -16,13 +16,13 @@ const MIN_MATCHES: usize = 30;
 const STRAYS: usize = 400;
 /// The image is divided into this many parts along each side, to see how much of it has no match.
 const PARTS: usize = 8;
-/// A match beyond all but this percentage at either end, and beyond as much again as lies between these, is an outlier where it stands
-/// [alone](is_alone) (open).
+/// Disparities are outliers if they are beyond all but this percentage at either end, by more than the span
+/// between these, and [alone](is_alone) (open).
 const TAIL_PERCENT: usize = 5;
-/// Pixels that it lies beyond them at least.
+/// The least distance from them, in pixels, to be an outlier.
 const LEAST_BEYOND: i32 = 16;
 /// Percentage of matches more than a pixel below 0 from which on the cameras count as converging (open). Of 52 pairs, two of satellites
-/// have more than half there and one of a robot has 2.5; the others, whose truth is above 0, have 1.0 at most, of which many are false.
+/// have more than half there and one of a robot has 2.5; the others, whose truth is above 0, have at most 1.0, many of them false.
 const BELOW_PERCENT: usize = 1;
 /// Approximate number of corners that [`warnings`] looks for: its statistics need no more.
 const SAMPLE: usize = 300;
@@ -32,7 +32,7 @@ const ROWS: usize = 8;
 /// rectified (indoors, from cars, from the air, rendered), none has more than 0.40 px; with one view shifted
 /// down by one pixel, all have 0.61 px or more.
 const MAX_OFFSET: u32 = FRACTION as u32 / 2;
-/// Corners that are found so far above or below their row, in 1/256 px, are not found on it.
+/// A corner found farther than this above or below its row, in 1/256 px, is off its row.
 const MAX_APART: u32 = 3 * FRACTION as u32 / 2;
 /// Percentage of matches with the wrong sign from which on the views count as swapped.
 const SWAPPED_PERCENT: usize = 90;
@@ -52,29 +52,29 @@ const SATURATED_PERCENT: usize = 10;
 /// truth, one has more: it ends in the middle of a wall, within half a pixel of the truth. The others have
 /// 2.0 at most, and 0.13 with the range of the calibration.
 const CLIPPED_PERCENT: usize = 2;
-/// Percentage of pixels found in both views, of those without a mask, below which the views hardly match (open). Of 52 pairs that do
-/// (rooms, roads, a robot's, from the air and from space), the least has 53 by the default and by `fast`, and 42 by `fgs`. Of the same 52
-/// with a view of another scene, with one inverted, of noise, and 20 rows apart, 202 of 208 have less than this by the default, and 194
-/// by `fast`.
+/// The views count as hardly matching below this percentage of unmasked pixels found in both views (open). Of
+/// 52 sound pairs (rooms, roads, from a robot, from the air and from space), the least has 53 with `default`
+/// and with `fast`, and 42 with `fgs`. Of the same 52 with a view of another scene, one inverted, one of
+/// noise, and one 20 rows off, 202 of 208 have less than this with `default`, and 194 with `fast`.
 const MEASURED_PERCENT: usize = 35;
-/// Percentage of masked pixels from which on the mask is to blame where few of the others are found (open).
+/// Percentage of masked pixels from which on the mask is to blame if few of the others are found (open).
 const MASKED_PERCENT: usize = 50;
-/// Pixels in a thousand at the upper end of a range that sparse matches found from which on it is [`wider`] (open). Of 54 ranges, two cut
-/// off a road: these have 11 and 12 by the default, 23 and 25 by `fast`. By `fast`, three of the others have more than 8 (one of them lacks
-/// the nearest 3 px), and 47 less than 4.
+/// A range that sparse matches found is made [`wider`] if more than this many pixels per thousand lie at its upper
+/// end (open). Of 54 ranges, two cut off a road: these have 11 and 12 with `default`, 23 and 25 with `fast`. With
+/// `fast`, three of the others have more than 8 (one of them lacks the nearest 3 px), and 47 less than 4.
 const ENDING: usize = 8;
-/// Ranges with fewer labels consist of nothing but ends.
+/// Ranges with fewer labels consist of ends only.
 const MIN_LABELS: usize = 3;
 
 /// The range of disparities in `pair`, with a margin.
 ///
-/// The margin is lopsided. The farthest surface is mostly a background that faces the cameras and has
-/// matches, so one pixel plus 1/24 of the matches' span is enough. The nearest surfaces are often grounds
-/// seen at grazing angles, which look different in the two views and have no matches: the margin is three
-/// pixels plus 1/4 of the span. (Open; both are set by five real pairs. Too many labels cost time, too few
-/// cost the foreground.)
+/// The margin is larger at the near end. The farthest surface is mostly a background that faces the cameras
+/// and has matches, so one pixel plus 1/24 of the matches' span is enough. The nearest surfaces are often
+/// grounds seen at grazing angles, which look different in the two views and have no matches: the margin is
+/// three pixels plus 1/4 of the span. (Open; both were set on five real pairs. Too many labels cost time, too
+/// few cost the foreground.)
 ///
-/// Parallel cameras see nothing below 0. Only where more than one match in a hundred lies more than a pixel below, these are searched.
+/// Parallel cameras see nothing below 0. Negative disparities are searched only if more than one match in a hundred is below -1.
 ///
 /// Where more than a quarter of the image has no match, that part may be a plain wall behind everything else.
 /// The range then extends down to 0, the horizon of parallel cameras.
@@ -82,16 +82,16 @@ const MIN_LABELS: usize = 3;
 /// Matches that are far from all others, in the image or in disparity, do not count.
 ///
 /// # Errors
-/// [`RangeError::NotRectified`] where the pair has too few matches to tell, and enough once it is rectified by its own;
-/// [`RangeError::NotFound`] where it has too few in any case, with the warning where one says that the pair must be mended;
-/// [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the search.
+/// [`RangeError::NotRectified`] when the pair has too few matches, but enough after rectification by its own;
+/// [`RangeError::NotFound`] when it has too few in any case, with the warning if one explains that;
+/// [`Error::Memory`](crate::Error::Memory) when the machine has too little memory for the search.
 pub fn range(pair: &Pair) -> Result<DisparityRange> {
     range_from(pair, None)
 }
 
-/// The range of a pair whose cameras are known: points in front of them have disparities above -`doffs`, the distance of their principal points
-/// along the row, in pixels. The range begins there at the least, and matches behind the cameras do not count, unless most are there: then
-/// the pair is not of these cameras.
+/// The range of a pair whose cameras are known: points in front of them have disparities above -`doffs`, the
+/// distance of their principal points along the row, in pixels. The range begins there at the least, and
+/// matches behind the cameras do not count, unless most are there: then the pair is not of these cameras.
 ///
 /// # Errors
 /// The errors of [`range`].
@@ -99,7 +99,7 @@ pub fn range_of_cameras(pair: &Pair, doffs: f64) -> Result<DisparityRange> {
     range_from(pair, Some(-doffs))
 }
 
-/// The range of the matches, and where `least` is given, of those with disparities from there on.
+/// The range of the matches; if `least` is given, only of those with at least this disparity.
 fn range_from(pair: &Pair, least: Option<f64>) -> Result<DisparityRange> {
     matches::check_memory(pair)?;
     if let Some(range) = range_by_matches(pair, least) {
@@ -116,10 +116,10 @@ fn range_from(pair: &Pair, least: Option<f64>) -> Result<DisparityRange> {
     Err(RangeError::NotFound { cause: cause.map(|cause| cause.to_string()) }.into())
 }
 
-/// The range of the matches of `pair`, from `least` on; `None` where there are too few.
+/// The range of the matches of `pair`, from `least` on; `None` if there are too few.
 fn range_by_matches(pair: &Pair, least: Option<f64>) -> Option<Result<DisparityRange>> {
     let mut found = matches::find(pair, None, None);
-    let in_front = |m: &Match, least: f64| f64::from(m.disparity) >= least * f64::from(FRACTION);
+    let in_front = |m: &SparseMatch, least: f64| f64::from(m.disparity) >= least * f64::from(FRACTION);
     let least = least.filter(|least| 2 * found.iter().filter(|m| in_front(m, *least)).count() > found.len());
     if let Some(least) = least {
         found.retain(|m| in_front(m, least));
@@ -142,14 +142,14 @@ fn range_by_matches(pair: &Pair, least: Option<f64>) -> Option<Result<DisparityR
     let below = disparities.partition_point(|d| *d < -FRACTION);
     let min = if 100 * below > BELOW_PERCENT * disparities.len() { min } else { min.max(0) };
     let (min, max) = (min.div_euclid(FRACTION), -(-max).div_euclid(FRACTION));
-    // A float beyond all integers becomes the last one.
+    // The conversion saturates.
     let least = least.map_or(min, |least| least.floor() as i32);
     Some(DisparityRange::new(min.max(least), max))
 }
 
-/// The disparities of `found` in an image of this size, sorted, without those of outliers.
-fn without_outliers(found: &[Match], size: (usize, usize)) -> Vec<i32> {
-    let sorted = |found: &mut dyn Iterator<Item = &Match>| {
+/// The sorted disparities of `found` without outliers, in an image of this size.
+fn without_outliers(found: &[SparseMatch], size: (usize, usize)) -> Vec<i32> {
+    let sorted = |found: &mut dyn Iterator<Item = &SparseMatch>| {
         let mut disparities: Vec<i32> = found.map(|m| m.disparity).collect();
         disparities.sort_unstable();
         disparities
@@ -162,31 +162,31 @@ fn without_outliers(found: &[Match], size: (usize, usize)) -> Vec<i32> {
     sorted(&mut found.iter().filter(|m| usual.contains(&m.disparity) || !is_alone(m, found, size)))
 }
 
-/// Whether no two other matches beside `one` have about its disparity: each part of a surface has several.
-fn is_alone(one: &Match, all: &[Match], (width, height): (usize, usize)) -> bool {
+/// Whether fewer than two other matches nearby have a similar disparity; parts of a surface have several.
+fn is_alone(one: &SparseMatch, all: &[SparseMatch], (width, height): (usize, usize)) -> bool {
     let reach = width.max(height) / PARTS;
-    let beside = |m: &&Match| {
+    let beside = |m: &&SparseMatch| {
         let apart = one.x.abs_diff(m.x).max(one.y.abs_diff(m.y));
-        // A surface so steep is hardly seen by both cameras.
+        // Steeper surfaces are hardly seen by both cameras.
         let close = 4 * FRACTION + apart as i32 * FRACTION / 4;
         apart <= reach && one.disparity.abs_diff(m.disparity) <= close.unsigned_abs()
     };
-    // It is beside itself.
+    // The match itself counts too.
     all.iter().filter(beside).count() <= 2
 }
 
-/// A probable mistake in a pair. It displays as one line with the cause, and with the remedy unless that is
-/// an argument of the front end.
+/// A likely fault of a pair. It displays as one line with the cause, and with the remedy unless that depends
+/// on the front end.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Warning {
-    /// The file of an image is damaged, in a way that its decoder makes up for.
+    /// An image file is damaged, but its decoder could recover.
     #[error("{doubt}; a part of the image may be wrong: get the file again")]
     Damaged {
-        /// The name of the file, and what is wrong with it.
+        /// The name of the file, and the damage.
         doubt: String,
     },
-    /// Images are stored turned, by the tags of their files, and were not turned upright.
+    /// The files tag their images as rotated, and they were not turned upright.
     #[error(
         "{} stored turned, by the orientation tag of EXIF or TIFF, and taken as stored",
         ["the left image is", "the right image is", "both images are"][*which]
@@ -195,16 +195,16 @@ pub enum Warning {
         /// The left image (0), the right one (1) or both (2).
         which: usize,
     },
-    /// Both views hold the same pixels.
+    /// Both views have the same pixels.
     #[error("the two images are the same, so they show no depth: give the right view as the second")]
     Identical,
-    /// No pixel of a view counts.
+    /// All pixels of a view are masked.
     #[error("the {view} view is masked everywhere, so nothing in it can be matched")]
     Masked {
         /// Name of the view: "left" or "right".
         view: &'static str,
     },
-    /// A view has next to no contrast anywhere.
+    /// A view has almost no contrast.
     #[error(
         "the {view} view is all one colour, so nothing in it can be matched: check that it is the right image and well \
          exposed"
@@ -213,7 +213,7 @@ pub enum Warning {
         /// Name of the view: "left" or "right".
         view: &'static str,
     },
-    /// Both views hold the same pixels in a part.
+    /// Both views have the same pixels in a part.
     #[error(
         "both views hold the same pixels {part}, so a part of one has got into the other, and shows no depth there: check what wrote \
          the images"
@@ -233,7 +233,7 @@ pub enum Warning {
         /// The part.
         part: Part,
     },
-    /// Next to nothing of some rows was found, other than of the rest.
+    /// Almost nothing of some rows was found, unlike the other rows.
     #[error(
         "next to nothing {part} of the left view is on the same rows of the right one, other than elsewhere: check that no view is torn, \
          and that both show one moment there"
@@ -287,7 +287,7 @@ pub enum Warning {
         /// The median of |dy| over the matches, in 1/256 px.
         offset: u32,
     },
-    /// Nearly everything lies further right in the right view.
+    /// Nearly everything is further right in the right view.
     #[error("the views seem to be swapped: {percent} % of the matches have negative disparities")]
     Swapped {
         /// Matches with negative disparities, in percent of all.
@@ -302,7 +302,7 @@ pub enum Warning {
         /// Pixels that were found, in percent of those that are not masked.
         percent: usize,
     },
-    /// Few of the pixels that a large mask leaves were found in the right view.
+    /// Few of the pixels outside a large mask were found in the right view.
     #[error(
         "only {percent} % of the pixels that the mask leaves were found in both views; it covers {masked} % of the left view: check that \
          it covers what is no image, and leaves what both views show in one piece"
@@ -329,7 +329,7 @@ pub enum Warning {
 }
 
 impl Warning {
-    /// Whether no range helps: the pair itself must be mended.
+    /// Whether no range helps, because the pair itself is at fault.
     fn is_beyond_range(&self) -> bool {
         !matches!(
             self,
@@ -338,34 +338,34 @@ impl Warning {
     }
 }
 
-/// The probable mistakes in `pair`, the likeliest cause first. Empty where all seems well or there are too
-/// few matches to tell. `range` is the range that the user asked for, if any.
+/// The likely faults of `pair`, the likeliest cause first; empty if there are none or too few matches to
+/// tell. `range` is the range that the user asked for, if any.
 ///
 /// Corners are searched in both directions along the row, up to half the width, and up to 8 rows away from
 /// it.
 ///
-/// - Damaged: the file of an image is damaged, and could be decoded nevertheless.
-/// - Oriented: the tag of a file says that its image is stored turned.
-/// - Masked: no pixel of a view counts.
+/// - Damaged: an image file is damaged, but could be decoded.
+/// - Oriented: the tag of a file says that its image is stored rotated.
+/// - Masked: all pixels of a view are masked.
 /// - Plain: nearly all grey of a view is within 4 levels of 8 bits. No other warning is given then.
-/// - Contrast, saturated: gain and offset between the views do no harm by themselves, because the matching
+/// - Contrast, saturated: gain and offset between the views are harmless by themselves, because the matching
 ///   cost uses a census. Detail that falls between the levels or is clipped at either end is lost. Contrast
 ///   is the span of the middle 90 % of grey.
-/// - Copied: of a part of at least an eighth, most pixels with texture are equal in both views.
-/// - Blurred: in a part of at least an eighth of the rows, a view has less than a quarter of the other's fine detail, measured against the
-///   contrast of the whole.
-/// - Torn: corners of a sixth of the rows or more are found on their row in the right view no more often than by chance, and elsewhere
-///   far more often. Faint corners do not count: a plain wall or the sky has no others.
-/// - Turned: there are hardly any matches, and many once the right view is turned.
-/// - Sideways: the matches along rows are few or not rectified, and those along columns are neither.
+/// - Copied: in a part of at least an eighth, most pixels with texture are equal in both views.
+/// - Blurred: in a part of at least an eighth of the rows, a view has less than a quarter of the other's fine
+///   detail, relative to the contrast of the whole.
+/// - Torn: corners of at least a sixth of the rows are found on their row in the right view no more often than
+///   by chance, and elsewhere far more often. Faint corners do not count: a plain wall or the sky has no others.
+/// - Turned: there are hardly any matches, but many after turning the right view.
+/// - Sideways: matches along rows are few or not rectified, and those along columns are not.
 /// - Not rectified: the median of |dy| exceeds half a pixel. This needs half of the matches to be off, in
 ///   whichever direction (a rotation moves the two sides in opposite directions), so a few false matches do
 ///   not matter.
-/// - Swapped: nine in ten matches of a rectified pair lie more than a pixel on the negative side. Converging cameras may cause
-///   that too; a user who gives a range with negative disparities knows, and is not warned. Of a pair that is not rectified, turned
-///   cameras decide on which side matches lie.
+/// - Swapped: nine in ten matches of a rectified pair are more than a pixel below 0. Converging cameras may
+///   cause that too; a user who gives a range with negative disparities knows, and is not warned. In an
+///   unrectified pair, rotated cameras decide the sign of disparities.
 ///
-/// On a machine without memory for the search only the checks are made that need none: up to the copied parts.
+/// Without enough memory for the search, only the checks before it are made, up to the copied parts.
 #[must_use]
 pub fn warnings(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     let mut out = damaged(pair);
@@ -374,7 +374,7 @@ pub fn warnings(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     out
 }
 
-/// What is wrong with the files of `pair`, once where both views are of one: [`Warning::Damaged`] alone, without any look at the pixels.
+/// [`Warning::Damaged`] for the files of `pair`, once if both views are from one file. Reads no pixels.
 #[must_use]
 pub fn damaged(pair: &Pair) -> Vec<Warning> {
     let mut doubts: Vec<_> = pair.doubts().iter().flatten().collect();
@@ -382,7 +382,7 @@ pub fn damaged(pair: &Pair) -> Vec<Warning> {
     doubts.into_iter().map(|doubt| Warning::Damaged { doubt: doubt.clone() }).collect()
 }
 
-/// Whether images are stored turned.
+/// Whether the images are stored rotated.
 fn oriented(pair: &Pair) -> Option<Warning> {
     let which = match pair.orientations().map(Orientation::is_upright) {
         [true, true] => return None,
@@ -393,7 +393,7 @@ fn oriented(pair: &Pair) -> Option<Warning> {
     Some(Warning::Oriented { which })
 }
 
-/// The other ones.
+/// All warnings that depend on pixel values (everything but `Damaged` and `Oriented`).
 fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     let tones = [("left", pair.left()), ("right", pair.right())]
         .map(|(view, image)| (view, Tones::of(image, |x, y| !image.masked[(x, y)])));
@@ -421,8 +421,8 @@ fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     if !is_searched {
         return out;
     }
-    // `None` where there are too few matches to tell.
-    let offset = |found: &[Match]| {
+    // The median of |dy|; `None` if there are too few matches.
+    let offset = |found: &[SparseMatch]| {
         let offset = || matches::median(found.iter().map(|m| m.dy.abs())).unsigned_abs();
         (found.len() >= MIN_MATCHES).then(offset)
     };
@@ -463,7 +463,7 @@ fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
         }
     }
     if copied.is_none() {
-        // Exposures that are far apart take the detail of one view, too.
+        // Very different exposures also cost one view its detail.
         let blurred = is_exposed_alike.then(|| parts::blurred(pair.left(), pair.right())).flatten();
         let blurred = blurred.map(|(view, part)| Warning::Blurred { view: ["left", "right"][view], part });
         let torn = || {
@@ -476,13 +476,13 @@ fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     out
 }
 
-/// The probable mistakes in a match over `range` that gave `maps`.
+/// The likely faults of a match over `range` that gave `maps`.
 ///
-/// - Hardly match: fewer than 35 % of the pixels that are not masked were found in both views. Where half of the left view or more is
-///   masked, that is little left: pixels beside masked ones are often not found, and neither are those whose match is outside the right
-///   view. No other warning is given then.
-/// - Clipped: many disparities at an end of the range, so that it probably cuts off part of the scene. The lower end does not count where
-///   it is 0, the horizon of parallel cameras.
+/// - Hardly match: fewer than 35 % of the unmasked pixels were found in both views. If at least half of the
+///   left view is masked, the warning is "little left": pixels next to masked ones are often not found, nor
+///   are those whose match is outside the right view. No other warning is given then.
+/// - Clipped: many disparities are at an end of the range, so it probably cuts off part of the scene. A lower
+///   end of 0, the horizon of parallel cameras, does not count.
 #[must_use]
 pub fn warnings_of(maps: &Maps, range: DisparityRange) -> Vec<Warning> {
     let pixels = || maps.raw.data().iter().zip(maps.validity.data());
@@ -510,8 +510,8 @@ pub fn warnings_of(maps: &Maps, range: DisparityRange) -> Vec<Warning> {
         .collect()
 }
 
-/// The range to search instead of one that sparse matches found and that gave `maps`, where the nearest surfaces are probably beyond it:
-/// half as many labels more at its upper end. `None` where it holds the scene. The lower end stays: what is far away has matches.
+/// A range to search again if `maps`, over a range from sparse matches, suggest that the nearest surfaces are beyond it: half as many
+/// labels more at the upper end. `None` if the range holds the scene. The lower end stays, because distant surfaces have matches.
 #[must_use]
 pub fn wider(maps: &Maps, range: DisparityRange) -> Option<DisparityRange> {
     let pixels = maps.raw.data().iter().zip(maps.validity.data());
@@ -523,9 +523,9 @@ pub fn wider(maps: &Maps, range: DisparityRange) -> Option<DisparityRange> {
     beyond(range).filter(|_| 1000 * at_end > ENDING * all)
 }
 
-/// Whether the scene goes beyond the upper end of `range`, by the `maps` over a wider one: what lies there is found in both views at
-/// least half as often as all else. (Open. On two pairs whose road was cut off it is .6 to .95 as often, by the default and by `fast`, and
-/// on four others that were matched again, whose truth ends before, .4 at most.)
+/// Whether the scene goes beyond the upper end of `range`, by `maps` over a wider range: pixels beyond are found in both
+/// views at least half as often as all others. (Open. On two pairs whose road was cut off it is .6 to .95 as often, with
+/// `default` and `fast`; on four others that were matched again, whose truth ends before, it is at most .4.)
 #[must_use]
 pub fn goes_beyond(maps: &Maps, range: DisparityRange) -> bool {
     let (mut all, mut found) = ([0_u64; 2], [0_u64; 2]);
@@ -537,7 +537,7 @@ pub fn goes_beyond(maps: &Maps, range: DisparityRange) -> bool {
     found[1] > 0 && 2 * found[1] * all[0] >= found[0] * all[1]
 }
 
-/// `range` with half as many labels more at its upper end; `None` where there is no such range, and where it is nothing but ends.
+/// `range` with half as many labels more at its upper end; `None` if that is no valid range or `range` consists of ends only.
 #[must_use]
 pub fn beyond(range: DisparityRange) -> Option<DisparityRange> {
     let max = range.max.checked_add(i32::try_from(range.labels() / 2).ok()?)?;
@@ -555,7 +555,7 @@ struct Tones {
 }
 
 impl Tones {
-    /// The statistics of the pixels that `count`; `None` where there are none.
+    /// The statistics of the pixels that `count`; `None` if there are none.
     fn of(image: &Image, count: impl Fn(usize, usize) -> bool) -> Option<Self> {
         let (width, height) = image.pixels.size();
         let mut counts = [0_usize; 256];
@@ -564,7 +564,7 @@ impl Tones {
             (0..width).filter(|x| count(*x, y)).for_each(|x| counts[usize::from(row[x][3] >> 8)] += 1);
         }
         let all: usize = counts.iter().sum();
-        // The lowest level such that more than this many percent of the pixels are at or below it.
+        // The lowest level with more than this percentage of the pixels at or below it.
         let level = |percent: usize| {
             let mut below = 0;
             counts.iter().position(|count| {
@@ -578,8 +578,8 @@ impl Tones {
     }
 }
 
-/// Warns of exposures so different that one view lacks detail that the other shows. `disparity` is the usual one, in pixels: what is masked
-/// in one view does not count in the other either.
+/// Warns if one view lacks detail of the other because their exposures differ. `disparity` is a typical one,
+/// in pixels: pixels masked in one view do not count in the other either.
 fn exposure(pair: &Pair, disparity: i32) -> Vec<Warning> {
     let of = |image: &Image, other: &Image, right: i32| {
         Tones::of(image, |x, y| {
@@ -603,7 +603,7 @@ fn exposure(pair: &Pair, disparity: i32) -> Vec<Warning> {
     out
 }
 
-/// Whether there are pixels unmasked in both views, and all of them are equal.
+/// Whether some pixels are unmasked in both views, and all of them are equal.
 fn identical(left: &Image, right: &Image) -> bool {
     let masks = left.masked.data().iter().zip(right.masked.data());
     let mut seen = left
@@ -624,14 +624,14 @@ mod tests {
 
     #[test]
     fn outliers_do_not_count() {
-        let at = |x: usize, d: i32| Match { x, y: 50, disparity: d * FRACTION, dy: 0, score: 1.0 };
-        // A surface at 10 to 49, and an object before it, whose matches are beside each other.
+        let at = |x: usize, d: i32| SparseMatch { x, y: 50, disparity: d * FRACTION, dy: 0, score: 1.0 };
+        // A surface at 10 to 49, and an object in front of it whose matches support each other.
         let mut found: Vec<_> = (0..400).map(|x| at(x, 10 + x as i32 / 10)).collect();
         found.extend([at(200, 120), at(205, 121), at(212, 122)]);
         let expected: Vec<_> = found.iter().map(|m| m.disparity).collect();
         found.extend([at(30, -634), at(350, 285), at(90, 120)]);
         assert_eq!(without_outliers(&found, (400, 100)), expected);
-        // A lone match that is not far from the others stays.
+        // A lone match that is close to the others stays.
         found.truncate(403);
         found.push(at(30, 70));
         assert_eq!(without_outliers(&found, (400, 100)).len(), 404);

@@ -1,8 +1,8 @@
-//! Conditioning of a pair: what rigs, lenses and noise made unlike in the two views is made alike before they are matched.
+//! Conditions a pair: reduces differences between the views that rigs, lenses and noise cause, before they are matched.
 //!
-//! Three faults are common in pairs that count as rectified, and each costs more than any part of a matcher gains: the views are a
-//! part of a row apart, one is blurred more than the other, or both are noisy or strongly compressed. They are measured on the whole image, and corrected by
-//! filters. A pair without them stays as it is, bit for bit.
+//! Three faults are common in rectified pairs, and each costs more than any part of a matcher gains: the rows of the views
+//! are offset by a fraction of a row, one view is blurred more than the other, or both are noisy or strongly compressed.
+//! They are measured on the whole image, and corrected by filters. A pair without them stays the same, bit for bit.
 
 mod compression;
 mod noise;
@@ -16,18 +16,18 @@ use crate::options::{DisparityRange, FrontOptions};
 use crate::threads::prelude::join;
 use std::fmt;
 
-/// What is corrected in a pair.
+/// The corrections that are made to a pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Conditioning {
-    /// How far the right view lies below the left one, in 1/256 px: it is moved up by this much.
+    /// The offset of the right view below the left one, in 1/256 px, by which it is moved up.
     pub offset: i32,
-    /// Standard deviations of the Gaussians that smooth the left and the right view, in pixels; 0 where a view stays as it is.
+    /// Standard deviations of the Gaussians that smooth the left and the right view, in pixels; 0 for none.
     pub smoothing: [f64; 2],
 }
 
-/// `pair`, whose disparities are in `range`, without the faults that `options` ask to be corrected, and what was corrected. A view that
-/// stays as it is, is shared.
+/// Corrects the faults of `pair` that `options` name, and returns the corrections. Its disparities are in
+/// `range`. A view that does not change is shared.
 #[must_use]
 pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> (Pair, Conditioning) {
     let mut found = Conditioning::default();
@@ -35,10 +35,10 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
     let unlike = || if options.equal_sharpness { sharpness::smoothing(pair, &halves) } else { [0.0; 2] };
     let needs_matches = options.level_rows || options.denoise;
     let matches_of = |halves: &Pair| if needs_matches { rows::matches(halves, range) } else { Vec::new() };
-    // At half the size, blocks of JPEG are no longer there.
+    // Halving removes the blocks of JPEG.
     let looks_for_blocks = options.denoise && pair.full().is_none();
     let blocks = || if looks_for_blocks { compression::smoothing(pair) } else { 0.0 };
-    // Each is too short for many threads, so they run beside each other.
+    // Each task is too short for many threads, so they run in parallel.
     let (blocks, (unlike, mut matches)) = join(blocks, || join(unlike, || matches_of(&halves)));
     found.smoothing = unlike;
     if found != Conditioning::default() {
@@ -47,7 +47,7 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
     if options.level_rows {
         found.offset = rows::offset(&matches);
         if found.offset != 0 {
-            // Offsets between whole rows are drawn to these. What is left is smaller, and so is its error.
+            // Measured offsets are biased towards whole rows. What remains is smaller, and so is its bias.
             matches = rows::matches(&found.apply(pair).map(Image::downsampled), range);
             found.offset += rows::median_offset(&matches);
         }
@@ -62,12 +62,12 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
 }
 
 impl Conditioning {
-    /// The same of a pair at twice the size.
+    /// The same corrections for a pair at twice the size.
     pub(super) fn doubled(&self) -> Self {
         Self { offset: 2 * self.offset, smoothing: self.smoothing.map(|sigma| 2.0 * sigma) }
     }
 
-    /// The pair without what was found in it.
+    /// Applies the corrections.
     pub(super) fn apply(&self, pair: &Pair) -> Pair {
         let level =
             if self.offset == 0 { pair.clone() } else { pair.with_right(moved(pair.right(), self.offset)) };
@@ -77,7 +77,7 @@ impl Conditioning {
     }
 }
 
-/// What was done to the views, in words; nothing where they stayed as they are.
+/// Describes the corrections; empty if there are none.
 impl fmt::Display for Conditioning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rows = f64::from(self.offset.abs()) / f64::from(FRACTION);

@@ -1,10 +1,10 @@
-//! A rig that drifts: how its right camera has turned since it was calibrated, by matches in rectified frames.
+//! Drift of a rig: how its right camera has rotated since it was calibrated, from matches in rectified frames.
 //!
-//! Shocks and warmth turn cameras by tenths of a degree, and then the rows of rectified views no longer line up. A match says by how much
-//! at its place: a turn up or down moves all rows alike, a turn about the axis moves them up on one side and down on the other, and
-//! a turn to a side bends them in the corners. [`Drift`] finds the rotation that brings the matches of the last frames back to their rows
-//! (least squares, where matches count less the farther they are off). A turn to a side also changes disparities, which no match can tell
-//! from another distance; its rows say less of it than of the others, and that is in the errors that are told.
+//! Shocks and warmth rotate cameras by tenths of a degree, and then the rows of rectified views no longer
+//! line up. A pitch moves all rows alike, a roll moves them up on one side and down on the other, and a yaw
+//! bends them in the corners. [`Drift`] finds the rotation that brings the matches of the last frames back to
+//! their rows (robust least squares). A yaw also changes disparities, which no match can tell from another
+//! distance; rows show it less well than the other angles, as the reported errors say.
 //!
 //! ```
 //! use mrfgs::drift::Drift;
@@ -42,9 +42,9 @@ use crate::rectification::Rectification;
 use crate::rectification::least_squares::solved;
 use std::collections::VecDeque;
 
-/// The frames that count: the last so many of those that were looked at.
+/// Frames that count: the last ones of those that were searched.
 const FRAMES: usize = 16;
-/// In the long run one frame in so many is looked at, so that it costs little.
+/// In the long run only one frame in this many is searched, to save time.
 const STRIDE: u64 = 64;
 /// Matches are searched in a pair whose longer side is at most this, in pixels.
 const SIDE: usize = 1024;
@@ -52,30 +52,30 @@ const SIDE: usize = 1024;
 const CORNERS: usize = 600;
 /// Rows above and below its own on which a corner is searched.
 const ROWS: usize = 4;
-/// Fewer matches than this, in all frames, tell nothing.
+/// Fewer matches than this, in all frames, are not reliable.
 const LEAST: usize = 60;
-/// A frame is searched again, turned by what was found in it, at most this many times: matches are exact near whole pixels, and a little
-/// short of the truth between them.
+/// A frame is searched at most this many times, each time after the rotation found so far: matches are exact
+/// near whole pixels, and biased between them.
 const SEARCHES: usize = 3;
-/// Steps of least squares.
+/// Iterations of least squares.
 const STEPS: usize = 12;
-/// Matches whose rows are this far apart count a quarter of others, in pixels of the pair that is searched; or the median, if that is more.
+/// Matches that are this far off their row count a quarter, in pixels of the searched pair; or the median distance, if that is more.
 const SCALE: f64 = 0.25;
-/// What is known before any match is seen of a turn to a side, in radians: that it is hardly ever more (open). The others show well.
+/// The prior of the yaw, in radians: it is rarely larger (open). The other angles need no prior.
 const UNUSUAL: f64 = 0.002;
-/// Offset of the rows, in pixels of the images, from which on a turn is worth resampling (open).
+/// Row offset, in pixels of the images, from which on a rotation is worth resampling (open).
 const WORTH: f64 = 0.1;
-/// So many standard errors are no chance.
+/// Standard errors from which on a rotation is significant.
 const SURE: f64 = 3.0;
 
-/// What the frames of a rig show of how its right camera has turned. It takes one frame after the other; the first, the fourth, the sixteenth and
-/// then every sixty-fourth is looked at, and of these the last sixteen count.
+/// Estimates the rotation of the right camera of a rig from its frames. It takes one frame after the other; the
+/// first, the fourth, the sixteenth and then every sixty-fourth is searched, and of these the last sixteen count.
 #[derive(Clone, Debug)]
 pub struct Drift {
     /// The rectified cameras of the calibration.
     cameras: [Camera; 2],
     size: (usize, usize),
-    /// What the frames are corrected by: from what the calibrated right view shows to what it should.
+    /// The rotation that the frames are corrected by, from the calibrated right view to the true one.
     applied: Matrix,
     frames: VecDeque<Vec<Sight>>,
     count: u64,
@@ -85,36 +85,36 @@ pub struct Drift {
 /// A match in rectified views.
 #[derive(Clone, Copy, Debug)]
 struct Sight {
-    /// The ray of its right end, as the calibrated right view shows it.
+    /// The ray of its right end, in the calibrated right view.
     right: [f64; 3],
     /// The row of its left end at depth 1.
     row: f64,
-    /// Pixels at depth 1 in the pair that was searched.
+    /// Focal length in pixels of the searched pair.
     focal_length: f64,
 }
 
-/// How the right camera of a rig has turned.
+/// A rotation of the right camera of a rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
-    /// The axis of its rotation in its rectified view (x right, y down, z forward), as long as the angle in radians.
+    /// The rotation axis in the rectified right view (x right, y down, z forward) times the angle in rad.
     pub axis: [f64; 3],
     /// Standard error of each component, in radians, as if all frames showed one still scene.
     pub errors: [f64; 3],
-    /// How many matches it comes from.
+    /// Number of matches that it comes from.
     pub matches: usize,
-    /// How far it moves rows apart at most, in pixels of the images.
+    /// The largest row offset that it causes, in pixels of the images.
     pub rows: f64,
     counts: bool,
 }
 
 impl Turn {
-    /// How far the camera looks up, to the right and clockwise, in degrees, from where it was calibrated.
+    /// How far the camera has turned up, to the right and clockwise since its calibration, in degrees.
     #[must_use]
     pub fn degrees(&self) -> [f64; 3] {
         self.axis.map(f64::to_degrees)
     }
 
-    /// Whether it moves rows apart by a tenth of a pixel or more, and is no chance.
+    /// Whether it moves rows by a tenth of a pixel or more, and is significant.
     #[must_use]
     pub fn counts(&self) -> bool {
         self.counts
@@ -122,10 +122,10 @@ impl Turn {
 }
 
 impl Drift {
-    /// Of a rig with this rectification, from which nothing has turned yet.
+    /// The drift of a rig with this rectification; no frame has been seen yet.
     ///
     /// # Errors
-    /// [`Error::Calibration`] for a rectification by matches of a pair alone, which is no calibration.
+    /// [`Error::Calibration`] for a rectification by matches alone, which is no calibration.
     pub fn of(calibrated: &Rectification) -> Result<Self> {
         calibrated.calibration()?;
         Ok(Self {
@@ -138,12 +138,12 @@ impl Drift {
         })
     }
 
-    /// Takes the next frame, rectified by what [`Drift::correct`] gave last, and looks at it if it is its turn. `range` holds its
-    /// disparities. Matches up to four rows off are found, in a pair of at most 1024 pixels a side.
+    /// Takes the next frame, rectified by the last result of [`Drift::correct`], and searches it if it is due.
+    /// `range` holds its disparities. It finds matches up to four rows off, in a pair of at most 1024 pixels a side.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for a pair of another size than the rectified views, [`Error::Memory`] when the machine has not enough for the
-    /// search.
+    /// [`Error::Mismatch`] for a pair of another size than the rectified views, [`Error::Memory`] when the
+    /// machine has too little memory for the search.
     pub fn follow(&mut self, pair: &Pair, range: DisparityRange) -> Result<()> {
         if pair.size() != self.size {
             let ((width, height), (w, h)) = (self.size, pair.size());
@@ -180,7 +180,7 @@ impl Drift {
         Ok(())
     }
 
-    /// The matches of a pair that is smaller by `scale`, searched after a turn of the calibrated right view `by` so much.
+    /// The matches of a pair reduced by `scale`, searched after rotating the calibrated right view `by` this.
     fn search(&self, small: &Pair, scale: f64, range: DisparityRange, by: &Matrix) -> Result<Vec<Sight>> {
         let (width, height) = small.size();
         let cameras = self.cameras.map(|camera| Camera {
@@ -199,7 +199,7 @@ impl Drift {
         let pair = turned.as_ref().unwrap_or(small);
         let found = matches::search(pair, None, Some(range), width * height / CORNERS, ROWS);
         let back = transposed(by);
-        let sight = |m: &matches::Match| {
+        let sight = |m: &matches::SparseMatch| {
             let [disparity, dy] = [m.disparity, m.dy].map(|v| f64::from(v) / f64::from(FRACTION));
             let at = |x: f64, y: f64, camera: &Camera| {
                 let ([fx, fy], [cx, cy]) = (camera.focal_length, camera.principal_point);
@@ -215,17 +215,17 @@ impl Drift {
         Ok(found.iter().map(sight).collect())
     }
 
-    /// How the right camera has turned since the calibration, as far as the last frames show it; `None` where they have too few matches.
+    /// The rotation of the right camera since the calibration, from the last frames; `None` if they have too few matches.
     #[must_use]
     pub fn turn(&self) -> Option<Turn> {
         self.turn
     }
 
-    /// What rectifies the next frames, where that is no longer what rectified the last ones: `calibrated`, with the right camera turned.
+    /// The rectification for the next frames, if that of the last ones is outdated: `calibrated`, with the right camera rotated.
     ///
     /// # Errors
-    /// [`Error::Memory`] where `calibrated` [keeps its places](Rectification::keep_places) and the machine has not
-    /// enough for others.
+    /// [`Error::Memory`] when `calibrated` [keeps its places](Rectification::keep_places) and the machine has
+    /// too little memory for new ones.
     pub fn correct(&mut self, calibrated: &Rectification) -> Result<Option<Rectification>> {
         let Some(turn) = self.turn.filter(Turn::counts) else { return Ok(None) };
         let by = rotation(turn.axis);
@@ -236,7 +236,7 @@ impl Drift {
         calibrated.with_right_turned(turn.axis).map(Some)
     }
 
-    /// How far a turn moves rows apart at most, in pixels of the images.
+    /// The largest row offset that a rotation causes, in pixels of the images.
     fn rows(&self, by: &Matrix) -> f64 {
         let [fx, fy] = self.cameras[1].focal_length;
         let [cx, cy] = self.cameras[1].principal_point;
@@ -256,14 +256,14 @@ impl Drift {
             return None;
         }
         let mut by = IDENTITY;
-        let mut fit = Fit::of(&sights, &by)?;
+        let mut fit = Fit::at(&sights, &by)?;
         for _ in 0..STEPS {
             let step = solved(fit.normal, fit.right)?;
             by = product(&rotation(step), &by);
-            fit = Fit::of(&sights, &by)?;
+            fit = Fit::at(&sights, &by)?;
         }
         let axis = rotation_vector(&by);
-        // A still scene is seen no better by many frames.
+        // More frames of a static scene do not improve the estimate.
         let frames = self.frames.len() as f64;
         let mut errors = [0.0; 3];
         for i in 0..3 {
@@ -276,28 +276,28 @@ impl Drift {
     }
 }
 
-/// What turns a view after one rotation as the other would have.
+/// The rotation that takes a view from one orientation to another.
 fn between(from: &Matrix, to: &Matrix) -> Matrix {
     product(to, &transposed(from))
 }
 
-/// The equations of a step of least squares.
+/// The normal equations of one iteration.
 struct Fit {
     normal: [[f64; 3]; 3],
     right: [f64; 3],
-    /// Of the rows of matches, in pixels².
+    /// Variance of the row offsets, in pixels².
     variance: f64,
 }
 
 impl Fit {
-    /// After a turn `by`.
-    fn of(sights: &[&Sight], by: &Matrix) -> Option<Self> {
+    /// The equations at the rotation `by`.
+    fn at(sights: &[&Sight], by: &Matrix) -> Option<Self> {
         let turned: Vec<(f64, [f64; 3])> = sights
             .iter()
             .map(|sight| {
                 let [x, y, z] = rotated(by, sight.right);
                 let (x, y, f) = (x / z, y / z, sight.focal_length);
-                // How a small turn about each axis moves the row.
+                // The row offset, and its derivative by a small rotation about each axis.
                 (f * (y - sight.row), [-f * (1.0 + y * y), f * x * y, f * x])
             })
             .collect();

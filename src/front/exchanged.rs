@@ -1,4 +1,4 @@
-//! Which of two images is the left one, where a calibration has the right camera on the left.
+//! Decides which of two images is the left one, if a calibration has the right camera on the left.
 
 use super::matches;
 use crate::calibration::cameras::StereoCalibration;
@@ -8,12 +8,12 @@ use crate::maps::FRACTION;
 use crate::rectification::{Options, Rectification};
 
 impl Rectification {
-    /// The rectification of the raw images of `pair` by a calibration, as [`Rectification::of_sizes`] makes it. Where that has the right
-    /// camera on the left of the left one, the matches of the pair say whether its images are exchanged as well: they are on one row and in
-    /// front of the cameras in one order alone. Without matches the images stay as they are.
+    /// The rectification of the raw images of `pair` by a calibration, like [`Rectification::of_sizes`]. If the calibration
+    /// has the right camera to the left of the left one, the matches decide whether the images are exchanged as well: only
+    /// in one order are they on the same rows and in front of the cameras. Without matches the images keep their order.
     ///
     /// # Errors
-    /// Those of [`Rectification::new`]; [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the rectified pair.
+    /// The errors of [`Rectification::new`]; [`Error::Memory`](crate::Error::Memory) if memory is too small.
     pub fn for_pair(calibration: &StereoCalibration, pair: &Pair, options: &Options) -> Result<Self> {
         let by = Self::of_sizes(calibration, pair.own_sizes(), options)?;
         if !by.has_exchanged_cameras() {

@@ -1,7 +1,7 @@
-//! Filters in integers, along rows and columns.
+//! Separable integer filters.
 //!
-//! At its borders an image goes on as it ends. A masked pixel counts as the one before it in its row that is not masked, or as the
-//! first; a masked row counts as the one above that is not, or as the first.
+//! The border pixels are repeated beyond the image. A masked pixel is replaced by the previous unmasked one
+//! in its row, or by the first; a masked row by the unmasked one above, or by the first.
 
 use bytemuck::{Pod, cast_slice, cast_slice_mut};
 use std::borrow::Cow;
@@ -12,20 +12,20 @@ use crate::image::{Image, Pixel, Plane, grey};
 use crate::maps::FRACTION;
 use crate::threads::prelude::*;
 
-/// What filters work on: numbers of 16 bits, one or more a pixel.
+/// Values that filters work on: one or more 16-bit numbers per pixel.
 pub(super) trait Pixels: Pod + Send + Sync {}
 
 impl<T: Pod + Send + Sync> Pixels for T {}
 
-/// The weights of adjacent pixels; they sum to 2 to [`BITS`].
+/// Weights of adjacent pixels; they sum to 2 to [`BITS`].
 struct Taps {
-    /// The place of the first, relative to the pixel that is computed.
+    /// The position of the first, relative to the output pixel.
     first: isize,
     weights: Vec<i32>,
 }
 
 impl Taps {
-    /// A Gaussian of `sigma` pixels; its centre takes up what is lost by rounding.
+    /// A Gaussian of `sigma` pixels; the centre absorbs the rounding errors.
     fn gaussian(sigma: f64) -> Self {
         let radius = (3.0 * sigma).ceil() as usize;
         let whole = f64::from(1 << BITS);
@@ -36,7 +36,7 @@ impl Taps {
     }
 }
 
-/// The image moved up by `offset`, in 1/256 px. Rows that come from outside are masked, and so is what comes from a masked pixel.
+/// Moves the image up by `offset`, in 1/256 px. Rows from outside and masked pixels are masked.
 pub(super) fn moved(image: &Image, offset: i32) -> Image {
     let (rows, part) = (offset.div_euclid(FRACTION) as isize, offset.rem_euclid(FRACTION));
     let nearest = |y: usize| {
@@ -50,10 +50,10 @@ pub(super) fn moved(image: &Image, offset: i32) -> Image {
     Image { pixels, masked }
 }
 
-/// The image at twice its size, by cubics (Keys 1981, with a slope of -3/4, which keeps fine detail). The four pixels that a pixel
-/// becomes lie a quarter of a pixel to its sides, so the centre of the image stays where it is; they are masked where the pixel is.
+/// Doubles the size of an image, by cubics (Keys 1981, with a slope of -3/4, which keeps fine detail). The four pixels that
+/// a pixel becomes lie a quarter of a pixel off its centre, so the image stays centred; they are masked if the pixel is.
 ///
-/// Where all values are whole 8-bit levels, they stay so: what is less than a level would be taken for texture.
+/// If all values are whole 8-bit levels, they stay so: fractions of a level would be mistaken for texture.
 pub(super) fn doubled(image: &Image) -> Image {
     const WEIGHTS: [i32; 4] = [-1728, 14_400, 4288, -576];
     let before = Taps { first: -2, weights: WEIGHTS.into_iter().rev().collect() };
@@ -82,18 +82,18 @@ pub(super) fn doubled(image: &Image) -> Image {
     Image { pixels, masked }
 }
 
-/// The image smoothed by a Gaussian of `sigma` pixels.
+/// Smooths an image by a Gaussian of `sigma` pixels.
 pub(super) fn smoothed(image: &Image, sigma: f64) -> Image {
     Image { pixels: smooth(&image.pixels, &image.masked, sigma), masked: image.masked.clone() }
 }
 
-/// The same, of anything that pixels hold.
+/// Smooths pixels of any type.
 pub(super) fn smooth<T: Pixels>(pixels: &Plane<T>, masked: &Plane<bool>, sigma: f64) -> Plane<T> {
     let taps = Taps::gaussian(sigma);
     across(&down(&unmasked(pixels, masked), &taps), &taps)
 }
 
-/// The pixels of an image, with others in the place of masked ones.
+/// The pixels of an image, with masked ones replaced.
 fn unmasked<'a, T: Pixels>(pixels: &'a Plane<T>, masked: &Plane<bool>) -> Cow<'a, Plane<T>> {
     let mut pixels = Cow::Borrowed(pixels);
     let all_masked = |y: usize| !masked.row(y).contains(&false);
@@ -150,7 +150,7 @@ fn across<T: Pixels>(pixels: &Plane<T>, taps: &Taps) -> Plane<T> {
     out
 }
 
-/// Sums of `terms` by their weights; `sums` is room for them.
+/// Sums of `terms` by their weights; `sums` is scratch memory.
 #[pulp::with_simd(weigh = crate::vectors::widest())]
 #[inline(always)]
 fn weigh_on<'a, S: pulp::Simd>(
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_rows_are_copied_and_others_lie_between() {
+    fn whole_rows_are_copied_and_others_interpolated() {
         let slope = image(3, 20, |x, y| (1000 * x + 512 * y) as u16);
         for rows in [-3, 0, 2] {
             let there = moved(&slope, rows * FRACTION);
@@ -225,7 +225,7 @@ mod tests {
     fn a_doubled_slope_is_half_as_steep() {
         let slope = doubled(&image(12, 10, |x, y| (4096 * x + 513 * y + 1) as u16));
         assert_eq!(slope.pixels.size(), (24, 20));
-        // Pixels lie a quarter to both sides of those that they come from; the filter is a little steeper there.
+        // Pixels lie a quarter to both sides of their source; the filter is slightly steeper there.
         for (x, y) in [(10, 9), (11, 8), (12, 12)] {
             let expected = 2048.0 * (x as f64 - 0.5) + 256.5 * (y as f64 - 0.5) + 1.0;
             let found = f64::from(slope.pixels[(x, y)][3]);
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_masked_has_no_influence() {
+    fn masked_pixels_have_no_influence() {
         let with = |hidden: u16| {
             let mut image = image(12, 9, |x, y| (97 * x * y) as u16);
             for (x, y) in [(5, 4), (0, 7), (11, 8)].into_iter().chain((0..12).flat_map(|x| [(x, 0), (x, 6)]))

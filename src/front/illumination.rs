@@ -49,8 +49,8 @@ pub fn homomorphic(image: &Image) -> Image {
     let kernel = gaussian(SIGMA, RADIUS);
     let low_pass = |values: &Plane<f64>| smooth(values, [&kernel, &kernel]);
     let logs = low_pass(&plane(pixels.par_iter().zip(masked).map(log).collect()));
-    // The quotient of the low-passes of logarithm and weight is the mean over unmasked pixels. Without any masked, the weight is that
-    // of a single pixel everywhere.
+    // The low-pass of the logarithm over the low-pass of the weight is the mean over unmasked pixels. Without
+    // masked pixels, the weight is the same everywhere.
     let weights =
         masked.contains(&true).then(|| low_pass(&plane(masked.iter().map(|m| f64::from(!m)).collect())));
     let one = low_pass(&Plane::filled(1, 1, 1.0))[(0, 0)];

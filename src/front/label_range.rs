@@ -4,7 +4,7 @@
 //! +- sigma for all its pixels. That excludes many true disparities, so the multiple of sigma is a parameter
 //! here.
 
-use super::matches::Match;
+use super::matches::SparseMatch;
 use super::zones::Zones;
 use crate::image::Plane;
 use crate::maps::FRACTION;
@@ -29,7 +29,12 @@ pub type LabelRanges = Plane<[i32; 2]>;
 /// # Panics
 /// When a match lies outside the map of zones.
 #[must_use]
-pub fn zonal(range: DisparityRange, zones: (&Plane<u32>, usize), matches: &[Match], k: f64) -> LabelRanges {
+pub fn zonal(
+    range: DisparityRange,
+    zones: (&Plane<u32>, usize),
+    matches: &[SparseMatch],
+    k: f64,
+) -> LabelRanges {
     let (map, count) = zones;
     // Number, sum and sum of squares: integers, so that their order does not matter.
     let mut sums = vec![(0_i64, 0_i64, 0_i64); count];
@@ -60,9 +65,9 @@ pub fn zonal(range: DisparityRange, zones: (&Plane<u32>, usize), matches: &[Matc
     map.map(|zone| intervals.get(*zone as usize).copied().unwrap_or(full))
 }
 
-/// First and last label index of each pixel, at every level of `plan`, in the form that backends take.
+/// First and last label index of each pixel, at every level of `plan`, in the form for backends.
 #[must_use]
-pub fn levels(plan: &Plan, zones: &Zones, matches: &[Match]) -> Vec<Plane<[u16; 2]>> {
+pub fn levels(plan: &Plan, zones: &Zones, matches: &[SparseMatch]) -> Vec<Plane<[u16; 2]>> {
     let mut label_range =
         zonal(plan.range, (&zones.map, zones.count), matches, plan.method.front.zone_sigmas);
     let mut levels = Vec::new();

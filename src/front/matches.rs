@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use view::{RADIUS, View};
 
-/// Approximate maximum of corners where no range is given: they only serve an overview then, and each is
+/// Approximate maximum of corners without a given range: they only serve an overview then, and each is
 /// searched in a whole row.
 const OVERVIEW: usize = 8192;
 /// Without a range, the search covers disparities up to 1 / `REACH` of the width, of either sign.
@@ -48,7 +48,7 @@ const SLOPE: i64 = 8;
 
 /// A pixel of the left view with its disparity.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Match {
+pub struct SparseMatch {
     /// Column in the left view, in pixels.
     pub x: usize,
     /// Row in the left view, in pixels.
@@ -72,7 +72,11 @@ pub struct Match {
 /// # Panics
 /// When the map of zones differs in size from the images.
 #[must_use]
-pub fn find(pair: &Pair, zones: Option<(&Plane<u32>, usize)>, range: Option<DisparityRange>) -> Vec<Match> {
+pub fn find(
+    pair: &Pair,
+    zones: Option<(&Plane<u32>, usize)>,
+    range: Option<DisparityRange>,
+) -> Vec<SparseMatch> {
     let (width, height) = pair.size();
     let spacing = if range.is_some() { SPACING } else { width * height / OVERVIEW };
     search(pair, zones, range, spacing, 0)
@@ -82,7 +86,7 @@ pub fn find(pair: &Pair, zones: Option<(&Plane<u32>, usize)>, range: Option<Disp
 /// copies of the pixels and mask of one view, or one of both, for trying other orientations.
 const BYTES: u64 = 2 * (2 + 4 + 8) + 8 + 2 * 9;
 
-/// Fails where the machine has not enough memory to search `pair`.
+/// Fails if the machine has too little memory to search `pair`.
 ///
 /// # Errors
 /// [`Error::Memory`](crate::Error::Memory).
@@ -107,7 +111,7 @@ pub(super) struct Survey {
     /// The corners that were searched, in raster order.
     pub(super) corners: Vec<Corner>,
     /// The matches that were found.
-    pub(super) matches: Vec<Match>,
+    pub(super) matches: Vec<SparseMatch>,
 }
 
 /// [`find`] with one corner per `spacing` pixels ([`SPACING`] at least), on up to `rows` rows above and below
@@ -118,7 +122,7 @@ pub(super) fn search(
     range: Option<DisparityRange>,
     spacing: usize,
     rows: usize,
-) -> Vec<Match> {
+) -> Vec<SparseMatch> {
     survey(pair, zones, range, spacing, rows).matches
 }
 
@@ -150,7 +154,7 @@ fn surveyed(
             let there = peak(&left, (x, y), &right, x as i32 - max..=x as i32 - min, rows)?;
             let (rx, ry) = (there.x as i32, there.y as i32);
             let back = peak(&right, (there.x, there.y), &left, rx + min..=rx + max, rows)?;
-            (back.x.abs_diff(x) <= 1 && back.y.abs_diff(y) <= 1).then(|| Match {
+            (back.x.abs_diff(x) <= 1 && back.y.abs_diff(y) <= 1).then(|| SparseMatch {
                 x,
                 y,
                 disparity: (x as i32 - rx) * FRACTION - there.right,
@@ -168,7 +172,7 @@ fn surveyed(
     Survey { corners: corners.collect(), matches }
 }
 
-/// The position where a window is found again.
+/// The position at which a window is found.
 struct Optimum {
     x: usize,
     y: usize,
@@ -179,8 +183,8 @@ struct Optimum {
     score: f64,
 }
 
-/// The one position in `columns`, within `rows` of its own row, where the window of `of` around (x, y) is
-/// found in `within`. `None` where the best score is too low, has a runner-up, or is no optimum along the
+/// The position in `columns`, within `rows` of its own row, at which the window of `of` around (x, y) is
+/// found in `within`. `None` if the best score is too low, has a close runner-up, or is no optimum along the
 /// row.
 fn peak(
     of: &View,
@@ -190,8 +194,8 @@ fn peak(
     rows: usize,
 ) -> Option<Optimum> {
     let (width, height) = within.grey.size();
-    // As many columns again on either side: a pattern that repeats there gives no reliable match here, and an
-    // optimum needs columns around it.
+    // Search as many columns again on either side: a pattern that repeats there makes the match ambiguous,
+    // and an optimum needs columns around it.
     let aside = columns.end() - columns.start() + 1;
     let first = (columns.start() - aside).max(RADIUS as i32);
     let last = (columns.end() + aside).min(width as i32 - 1 - RADIUS as i32);
@@ -204,7 +208,7 @@ fn peak(
     let scores: Vec<Vec<f64>> =
         (top..=bottom).map(|v| correlation(of, (x, y), within, v, first..=last)).collect();
 
-    // Of equal scores the last one; the runner-up test then rejects it.
+    // The last one of equal scores; the runner-up test then rejects it.
     let (mut score, mut at) = (f64::NEG_INFINITY, None);
     for (v, row) in scores.iter().enumerate() {
         let best = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -239,7 +243,7 @@ fn vertex(before: f64, peak: f64, after: f64) -> i32 {
     if bend < 0.0 { ((before - after) / (2.0 * bend) * f64::from(FRACTION) + 0.5).floor() as i32 } else { 0 }
 }
 
-/// The median; 0 of nothing.
+/// The median; 0 if there are no values.
 pub(super) fn median(values: impl Iterator<Item = i32>) -> i32 {
     let mut values: Vec<i32> = values.collect();
     values.sort_unstable();
@@ -247,12 +251,12 @@ pub(super) fn median(values: impl Iterator<Item = i32>) -> i32 {
 }
 
 /// The matches that agree with others around them, in their own and the adjacent cells (of `side` pixels).
-fn consistent(matches: Vec<Match>, side: usize) -> Vec<Match> {
-    let mut cells = BTreeMap::<(usize, usize), Vec<&Match>>::new();
+fn consistent(matches: Vec<SparseMatch>, side: usize) -> Vec<SparseMatch> {
+    let mut cells = BTreeMap::<(usize, usize), Vec<&SparseMatch>>::new();
     for m in &matches {
         cells.entry((m.x / side, m.y / side)).or_default().push(m);
     }
-    let agrees = |m: &Match| {
+    let agrees = |m: &SparseMatch| {
         let (i, j) = (m.x / side, m.y / side);
         let mut around: Vec<_> = (j.saturating_sub(1)..=j + 1)
             .flat_map(|j| (i.saturating_sub(1)..=i + 1).map(move |i| (i, j)))

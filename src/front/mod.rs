@@ -21,7 +21,7 @@ use crate::plan::Plan;
 use crate::watch::Watch;
 use conditioning::Conditioning;
 use illumination::homomorphic;
-use matches::Match;
+use matches::SparseMatch;
 use zones::Zones;
 
 /// Everything that a backend needs for a match.
@@ -32,7 +32,7 @@ pub struct Prepared {
     /// First and last label index of each pixel, by level; empty where every label is allowed.
     pub label_ranges: Vec<Plane<[u16; 2]>>,
     /// The source of the label ranges: texture zones and sparse matches.
-    pub zones: Option<(Zones, Vec<Match>)>,
+    pub zones: Option<(Zones, Vec<SparseMatch>)>,
 }
 
 impl Prepared {

@@ -1,42 +1,42 @@
-//! Parts of a pair that are not like the rest of it: what statistics of the whole do not show.
+//! Detects parts of a pair that differ from the rest, which statistics of the whole do not show.
 
 use super::matches::{Corner, Survey};
 use crate::image::{Image, Plane};
 use std::fmt;
 use std::ops::Range;
 
-/// The views are divided into so many bands along each side.
+/// Bands that the views are divided into along each side.
 const BANDS: usize = 8;
 /// Difference across two pixels from which on a pixel has texture, in 1/256 of a level.
 const TEXTURE: u16 = 2 << 8;
-/// Smallest part of a band that has texture, where it has any to speak of: one in so many pixels (open).
+/// A band has texture if more than one in this many of its pixels have (open).
 const TEXTURED: u64 = 50;
-/// Percentage of the pixels with texture that are equal in both views from which on a band was copied (open). Of 68 sound pairs, no band
-/// has more than 12; a copy has 100.
+/// Percentage of the pixels with texture that are equal in both views from which on a band counts as copied
+/// (open). Of 68 sound pairs, no band has more than 12; a copy has 100.
 const COPIED_PERCENT: u64 = 60;
-/// Distance over which contrast is measured, in pixels: blur leaves it.
+/// Distance over which contrast is measured, in pixels: blur does not affect it.
 const FAR: usize = 8;
-/// Bend of the grey along a row that counts as no detail, in 1/256 of a level: rounding bends what is blurred by as much.
+/// Second differences of grey that count as no detail, in 1/256 of a level: rounding causes as much.
 const ROUNDING: f64 = 512.0;
-/// How many times the detail of the other view a band has, where one of the two is blurred or covered (open). Of 68 sound pairs, one out of
-/// focus by 5 x 5 pixels among them, none has more than 2.4; blur with a sigma of 2 gives 4.3 at least, of 4 gives 20.
+/// Ratio of the detail of a band between the views from which on one is blurred or covered (open). Of 68 sound pairs, one out
+/// of focus by 5 x 5 pixels among them, none has more than 2.4; blur with a sigma of 2 gives at least 4.3, of 4 gives 20.
 const SHARPER: f64 = 4.0;
-/// A band with less than this part of the detail of the whole view is plain.
+/// A band with less than this share of the view's mean detail is plain.
 const PLAIN: f64 = 1.0 / 8.0;
-/// Corners with less than this part of the usual strength of those that were found may be noise on a plain surface.
+/// Corners below this share of the median strength of those that were found may be noise on a plain surface.
 const FAINT: f64 = 0.25;
-/// Share of corners that are found by chance where the views do not belong together.
+/// Share of corners that are found by chance in unrelated views.
 const CHANCE: f64 = 0.03;
-/// Smallest part of the height that is doubted, one in so many rows, and the fewest corners in it.
+/// The smallest doubtful part, one in this many rows, and the fewest corners in it.
 const LEAST: (usize, usize) = (6, 20);
-/// Logarithm of the odds that rows do not belong together, from which on that is said (open). Of 68 sound pairs, one has 19.1, a pattern
-/// that repeats; the others have 13.3 at most.
+/// Logarithm of the odds from which on rows are reported as unrelated (open). Of 68 sound pairs, one with a
+/// repetitive pattern has 19.1; the others have at most 13.3.
 const ODDS: f64 = 20.0;
 
-/// A part of both views: rows from side to side, or columns from top to bottom.
+/// A part of both views: rows over the full width, or columns over the full height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// All of it.
+    /// The whole view.
     Whole,
     /// Some rows.
     Rows {
@@ -44,7 +44,7 @@ pub enum Part {
         first: usize,
         /// The last one.
         last: usize,
-        /// How many the views have.
+        /// The number of rows of the views.
         of: usize,
     },
     /// Some columns.
@@ -53,7 +53,7 @@ pub enum Part {
         first: usize,
         /// The last one.
         last: usize,
-        /// How many the views have.
+        /// The number of columns of the views.
         of: usize,
     },
 }
@@ -68,13 +68,13 @@ impl fmt::Display for Part {
     }
 }
 
-/// The most bands in a row that `are`, where any are.
+/// The longest run of bands with a true value, if there is any.
 fn longest(are: [bool; BANDS]) -> Option<Range<usize>> {
     let run = |first: usize| first..(first..BANDS).find(|i| !are[*i]).unwrap_or(BANDS);
     (0..BANDS).map(run).max_by_key(|run| (run.len(), BANDS - run.start)).filter(|run| !run.is_empty())
 }
 
-/// The pixels `of` a side that are in these bands, the first and the last.
+/// The first and the last pixel of these bands, along a side of `of` pixels.
 fn pixels(bands: &Range<usize>, of: usize) -> [usize; 2] {
     [bands.start * of / BANDS, bands.end * of / BANDS - 1]
 }
@@ -84,13 +84,13 @@ fn rows(bands: &Range<usize>, of: usize) -> Part {
     if bands.len() == BANDS { Part::Whole } else { Part::Rows { first, last, of } }
 }
 
-/// The part of the views that holds the same pixels in both. Only pixels with texture count: what is black or white is so in both.
+/// The part with the same pixels in both views. Only pixels with texture count, as black and white areas are equal in both.
 pub(super) fn copied(left: &Image, right: &Image) -> Option<Part> {
     let (width, height) = left.pixels.size();
     if width < BANDS || height < BANDS {
         return None;
     }
-    // Of each cell the pixels with texture, and those of them that are equal.
+    // For each cell, the pixels with texture, and those of them that are equal.
     let mut cells = [[[0_u64; 2]; BANDS]; BANDS];
     for y in 0..height {
         let views = [left.pixels.row(y), right.pixels.row(y)];
@@ -129,7 +129,7 @@ struct Detail {
 }
 
 impl Detail {
-    /// The mean bend of the grey along the rows beyond `rounding`, in parts of the `contrast`; 0 where most is `masked`.
+    /// Mean second difference of grey beyond `rounding`, relative to the `contrast`; 0 if most is `masked`.
     fn of(image: &Image, masked: &Plane<bool>, contrast: f64, rounding: f64) -> Self {
         let (width, height) = image.pixels.size();
         let mut bands = [(0.0, 0); BANDS];
@@ -150,14 +150,14 @@ impl Detail {
         Self { bands: bands.map(mean) }
     }
 
-    /// Which bands have far more of it than those of the `other` view, and are not plain.
+    /// The bands with far more detail than those of the `other` view that are not plain.
     fn is_more(&self, other: &Self) -> [bool; BANDS] {
         let mean = self.bands.iter().sum::<f64>() / BANDS as f64;
         std::array::from_fn(|i| self.bands[i] > SHARPER * other.bands[i] && self.bands[i] > PLAIN * mean)
     }
 }
 
-/// The mean difference of the grey across [`FAR`] pixels; `None` where there is none.
+/// The mean difference of grey over [`FAR`] pixels; `None` if it is 0.
 fn contrast(image: &Image, masked: &Plane<bool>) -> Option<f64> {
     let (mut sum, mut count) = (0_u64, 0_u64);
     for y in 0..image.pixels.height() {
@@ -172,14 +172,14 @@ fn contrast(image: &Image, masked: &Plane<bool>) -> Option<f64> {
     (sum > 0).then(|| sum as f64 / count as f64)
 }
 
-/// The view, left (0) or right (1), that is blurred or covered in a part where the other one shows detail.
+/// The view, left (0) or right (1), that is blurred or covered in a part where the other has detail.
 pub(super) fn blurred(left: &Image, right: &Image) -> Option<(usize, Part)> {
     let (width, height) = left.pixels.size();
-    // What is masked in one view does not count in the other either.
+    // Pixels masked in one view do not count in the other either.
     let masked = Plane::from_fn(width, height, |x, y| left.masked[(x, y)] || right.masked[(x, y)]);
     let contrasts = [contrast(left, &masked)?, contrast(right, &masked)?];
     let detail = |image: &Image, i: usize| {
-        // As many parts of the contrast in both.
+        // Scale the rounding to the same share of the contrast in both views.
         let rounding = ROUNDING * (contrasts[i] / contrasts[1 - i]).max(1.0);
         Detail::of(image, &masked, contrasts[i], rounding)
     };
@@ -190,18 +190,18 @@ pub(super) fn blurred(left: &Image, right: &Image) -> Option<(usize, Part)> {
     Some((view, rows(&bands, height)))
 }
 
-/// The rows of which next to nothing is found on the same rows of the right view, other than of the rest. Faint corners do not count.
-/// `masked` is the mask of the right view.
+/// The rows that are hardly found on the same rows of the right view, unlike the rest. Faint corners do not
+/// count. `masked` is the mask of the right view.
 ///
-/// The rows are those with the largest likelihood ratio: how much likelier it is that their corners were found by chance alone than as
-/// often as all.
+/// They are the rows with the largest likelihood ratio of two hypotheses: their corners are found by chance,
+/// or as often as all corners.
 pub(super) fn strange(survey: &Survey, masked: &Plane<bool>, most_rows: u32) -> Option<Part> {
     let (width, height) = masked.size();
     let found = |corner: &&Corner| corner.offset.is_some_and(|dy| dy <= most_rows);
     let mut strengths: Vec<f64> = survey.corners.iter().filter(found).map(|corner| corner.strength).collect();
     strengths.sort_unstable_by(f64::total_cmp);
     let least = FAINT * strengths.get(strengths.len() / 2)?;
-    // What is mostly masked in the right view is found nowhere.
+    // Rows that are mostly masked in the right view cannot be found.
     let is_seen = |y: usize| 2 * masked.row(y).iter().filter(|masked| **masked).count() < width;
     let seen: Vec<bool> = (0..height).map(is_seen).collect();
     let strong: Vec<_> = survey.corners.iter().filter(|c| c.strength >= least && seen[c.y]).collect();

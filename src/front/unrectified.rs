@@ -1,48 +1,48 @@
-//! Rectification of a pair by its own matches: from a coarse search of the whole image to a fine one along the rows.
+//! Rectifies a pair by its own matches: from a coarse search of the whole image to a fine one along rows.
 
-use super::matches::{self, Match};
+use super::matches::{self, SparseMatch};
 use crate::error::{Error, RectificationError, Result};
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
 use crate::options::DisparityRange;
 use crate::rectification::{Correspondence, Options, Rectification};
 
-/// The longer side of the smallest pair, in pixels, and of the largest that is searched, are at most this (open).
+/// The largest sides, in pixels, of the pairs for the coarse and the fine search (open).
 const SIDES: [usize; 2] = [320, 1600];
-/// In the smallest pair, matches are searched up to 1 / `REACH` of the height above and below.
+/// The coarse search covers 1 / `REACH` of the height above and below.
 const REACH: usize = 3;
-/// By so many degrees the right view is turned for that search, one after the other, until enough matches agree: windows that are turned by
-/// about 10 degrees still look alike.
+/// Angles in degrees by which the right view is rotated for the coarse search, one after the other, until
+/// enough matches agree: windows still look alike at rotations of about 10 degrees.
 const TURNS: [f64; 5] = [0.0, 12.0, -12.0, 24.0, -24.0];
-/// Rows above and below, in a pair that is nearly rectified.
+/// Rows above and below that are searched in a nearly rectified pair.
 const ROWS: usize = 4;
-/// Approximate number of corners that are searched in the smallest pair, and in others.
+/// Approximate number of corners in the coarse search, and in the others.
 const CORNERS: [usize; 2] = [1024, 4096];
-/// Pixels beside the disparities that were found, and a part of their span, that are searched too.
+/// The range is extended by this many pixels and this share of its span on both sides.
 const MARGIN: (f64, f64) = (4.0, 0.125);
 
 impl Rectification {
-    /// The rectification of `pair` by matches of its own, as [`Rectification::of_matches`] makes it of them: for two photographs of one
-    /// camera that was moved to the side. It may have turned: by some degrees up or to a side, and by up to about 30 about its axis. Masked
-    /// pixels do not count.
+    /// The rectification of `pair` by its own matches, like [`Rectification::of_matches`]: for two
+    /// photographs of one camera that was moved to the side. It may have rotated by some degrees up or to a
+    /// side, and by up to about 30 about its axis. Masked pixels do not count.
     ///
-    /// Corners of the left image are searched in a smaller pair, far to all sides. Then the pair is rectified by these matches, and the
-    /// corners are searched anew in that, along the rows: views that were turned look alike there. That is repeated at twice the size,
-    /// up to 1600 pixels.
+    /// Corners of the left image are first searched in a smaller pair, far in all directions. Then the pair
+    /// is rectified by these matches, and the corners are searched again along the rows, where rotated views
+    /// look alike. That is repeated at twice the size, up to 1600 pixels.
     ///
     /// # Errors
-    /// Those of [`Rectification::of_matches`]; [`Error::Memory`] when the machine has not enough for the search.
+    /// The errors of [`Rectification::of_matches`]; [`Error::Memory`] if the machine has too little.
     pub fn of_pair(pair: &Pair, options: &Options) -> Result<Self> {
         Self::of_matches(&Self::matches_of(pair)?, pair.size(), options)
     }
 
-    /// The matches of `pair` by which [`Rectification::of_pair`] rectifies it.
+    /// The matches by which [`Rectification::of_pair`] rectifies `pair`.
     ///
     /// # Errors
-    /// Those of [`Rectification::of_pair`] that concern matches.
+    /// The errors of [`Rectification::of_pair`] that concern matches.
     pub fn matches_of(pair: &Pair) -> Result<Vec<Correspondence>> {
         matches::check_memory(pair)?;
-        // Of pairs at 1, 1/2, 1/4 of the size and so on.
+        // The pair at 1, 1/2, 1/4 of its size and so on.
         let mut pairs = vec![pair.clone()];
         while let Some(last) = pairs.last().filter(|pair| longer(pair) > SIDES[0]) {
             pairs.push(last.map(Image::downsampled));
@@ -53,7 +53,7 @@ impl Rectification {
                 found = finer(pair, &found)?;
             }
             if i > 0 {
-                // A pixel of the smaller pair is around every second one of the larger.
+                // Pixels of the smaller pair are centred on every second one of the larger.
                 found.iter_mut().flatten().flatten().for_each(|v| *v *= 2.0);
             }
         }
@@ -65,7 +65,7 @@ fn longer(pair: &Pair) -> usize {
     pair.size().0.max(pair.size().1)
 }
 
-/// Rough matches of a small pair: those of the first turn by which enough agree, or else the most.
+/// Rough matches of a small pair: those at the first rotation with enough agreeing ones, or else the most.
 fn coarse(pair: &Pair) -> Result<Vec<Correspondence>> {
     let rows = pair.size().1 / REACH;
     let mut most = Vec::new();
@@ -84,13 +84,13 @@ fn coarse(pair: &Pair) -> Result<Vec<Correspondence>> {
     Ok(most)
 }
 
-/// Matches of `pair` that are found once it is rectified by rough ones.
+/// The matches of `pair` after rectification by rough ones.
 fn finer(pair: &Pair, rough: &[Correspondence]) -> Result<Vec<Correspondence>> {
     let (by, agreeing) = Rectification::roughly(rough, pair.size())?;
     search(pair, &by, range(&by, &agreeing), CORNERS[1], ROWS)
 }
 
-/// Matches of `pair`, searched in what `by` makes of it: about so many `corners`, each up to `rows` above and below.
+/// Matches of `pair` after rectification: about so many `corners`, searched in `rows` above and below.
 fn search(
     pair: &Pair,
     by: &Rectification,
@@ -100,7 +100,7 @@ fn search(
 ) -> Result<Vec<Correspondence>> {
     let (width, height) = by.size();
     let found = matches::search(&by.apply(pair)?, None, range, width * height / corners, rows);
-    let ends = |m: &Match| {
+    let ends = |m: &SparseMatch| {
         let [right, down] = [-m.disparity, m.dy].map(|v| f64::from(v) / f64::from(FRACTION));
         let (x, y) = (m.x as f64, m.y as f64);
         Some([by.left(x, y)?, by.right(x + right, y + down)?])
@@ -108,7 +108,7 @@ fn search(
     Ok(found.iter().filter_map(ends).collect())
 }
 
-/// The disparities of `matches` in rectified views, and some beside.
+/// The disparities of `matches` in rectified views, with a margin.
 fn range(by: &Rectification, matches: &[Correspondence]) -> Option<DisparityRange> {
     let disparities = || matches.iter().map(|of| by.rectified(0, of[0])[0] - by.rectified(1, of[1])[0]);
     let (least, most) =

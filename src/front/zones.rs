@@ -121,10 +121,10 @@ struct Features {
     coordinates: [Vec<i16>; 2],
 }
 
-/// A vector of features: all orientations of a wavelength, and two more places.
+/// A vector of features: all orientations of a wavelength, and two free places.
 const LANES: usize = ORIENTATIONS + 2;
 
-/// The smoothed magnitudes of the filters of a wavelength at their nodes, and the position of the pixels among them.
+/// The smoothed filter magnitudes of a wavelength at its nodes, and where the pixels lie among these.
 struct Octave {
     nodes: Plane<[i16; LANES]>,
     across: Vec<Place>,
@@ -169,7 +169,7 @@ impl Features {
         Self { octaves, coordinates: [along(x, image.width()), along(y, image.height())] }
     }
 
-    /// Number of values per pixel: the features, and 0 up to whole vectors.
+    /// Values per pixel: the features, padded with 0 to whole vectors.
     fn dimensions(&self) -> usize {
         (self.octaves.len() * ORIENTATIONS + 2).next_multiple_of(VECTOR)
     }
@@ -184,7 +184,7 @@ impl Features {
             line.resize(octave.nodes.width(), [0; LANES]);
             interpolate(octave, y, &mut line, &mut row[i * ORIENTATIONS..], dimensions);
         }
-        // In the two places after the features of the last octave.
+        // The coordinates go to the two places after the features of the last octave.
         for (values, x) in row.chunks_exact_mut(dimensions).zip(by_x) {
             values[self.octaves.len() * ORIENTATIONS..][..2].copy_from_slice(&[*x, by_y[y]]);
         }
@@ -192,8 +192,8 @@ impl Features {
     }
 }
 
-/// The features of an octave for row `y`, `dimensions` apart; each pixel's two more places are the next octave's to fill. `line` is
-/// for the row's nodes.
+/// Interpolates the features of an octave for row `y`, `dimensions` apart; the two free places of each pixel
+/// are overwritten by the next octave. `line` is scratch memory for the row's nodes.
 #[pulp::with_simd(interpolate = crate::vectors::widest())]
 #[inline(always)]
 fn interpolate_on<'a, S: pulp::Simd>(

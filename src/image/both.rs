@@ -1,4 +1,4 @@
-//! Both views in one file of a stereo camera: MPO, two JPEG images one after the other, and JPS, one that holds both.
+//! Both views in one file of a stereo camera: MPO, two JPEG images in sequence, and JPS, one image with both.
 
 use std::ops::Range;
 use std::path::Path;
@@ -10,11 +10,11 @@ use super::jpeg;
 use super::raster::Raster;
 use crate::error::ReadError;
 
-/// How the data in the segments begins that tell of two views.
+/// The signatures of the segments that describe the two views.
 const MPO: &[u8] = b"MPF\0";
 const JPS: &[u8] = b"_JPSJPS_";
 
-/// The left and the right view in the file `bytes`, called `path`, and whether it says which one is the left one.
+/// Both views in the file `bytes`, called `path`, and whether the file says which is the left one.
 pub(super) fn decode_both(
     path: &Path,
     bytes: &[u8],
@@ -31,7 +31,7 @@ pub(super) fn decode_both(
         let cut = || damaged("a view is missing");
         return Ok(([left.ok_or_else(cut)??, right.ok_or_else(cut)??], true));
     }
-    let Some(halves) = Halves::of(path, bytes)? else {
+    let Some(halves) = Halves::find(path, bytes)? else {
         return Err(
             "holds one view; give the file of the right view too (files with both are .mpo and .jps)".into(),
         );
@@ -49,17 +49,17 @@ pub(super) fn decode_both(
     Ok((views, halves.is_said))
 }
 
-/// How the views lie in an image that holds both.
+/// The layout of an image with both views.
 struct Halves {
     above: bool,
     left_first: bool,
-    /// Whether the file says so.
+    /// Whether the file states the layout.
     is_said: bool,
 }
 
 impl Halves {
-    /// By what the file says, or by its name: without more words, a `.jps` is for looking at it with crossed eyes.
-    fn of(path: &Path, bytes: &[u8]) -> Result<Option<Self>, ReadError> {
+    /// The layout from the file, or from its name: by default, a `.jps` is for cross-eyed viewing.
+    fn find(path: &Path, bytes: &[u8]) -> Result<Option<Self>, ReadError> {
         let said = jpeg::segments(bytes)
             .find(|(marker, body)| *marker == 0xe3 && bytes[body.clone()].starts_with(JPS));
         let Some((_, body)) = said else {
@@ -67,7 +67,7 @@ impl Halves {
                 && path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("jps"));
             return Ok(is_jps.then_some(Self { above: false, left_first: false, is_said: false }));
         };
-        // Behind the name and two bytes: how far the views are apart, flags, the layout, and whether it is a pair at all.
+        // After the signature and two bytes: separation of the views, flags, layout, and the kind of file.
         match bytes[body].get(JPS.len() + 2..).and_then(<[u8]>::first_chunk) {
             Some(&[_, flags, layout @ (2 | 3), 1]) => {
                 Ok(Some(Self { above: layout == 3, left_first: flags & 4 != 0, is_said: true }))
@@ -76,20 +76,20 @@ impl Halves {
                 Err("holds both views mixed with each other; save them side by side, or as two files".into())
             }
             Some(_) => Ok(None),
-            None => Err(damaged("what it says of its views is cut off")),
+            None => Err(damaged("the description of its views is cut off")),
         }
     }
 }
 
-/// Where the two views of an MPO file are; `None` where it is none.
+/// The places of the two views in an MPO file; `None` if it is none.
 fn index(bytes: &[u8]) -> Result<Option<[Range<usize>; 2]>, ReadError> {
     const IMAGES: usize = 0xb002;
-    /// The kinds of images that are reduced copies of others.
+    /// The kind of images that are reduced copies of others.
     const COPIES: u8 = 1;
     let said =
         jpeg::segments(bytes).find(|(marker, body)| *marker == 0xe2 && bytes[body.clone()].starts_with(MPO));
     let Some((_, body)) = said else { return Ok(None) };
-    // A part of it is laid out like a TIFF file, from here on.
+    // The rest of the segment is laid out like a TIFF file, with offsets from here.
     let origin = body.start + MPO.len();
     let part = &bytes[origin..body.end];
     let lowest_first = part.starts_with(b"II");
@@ -105,7 +105,7 @@ fn index(bytes: &[u8]) -> Result<Option<[Range<usize>; 2]>, ReadError> {
         let (length, start) = (number(entry + 4, 4)?, number(entry + 8, 4)?);
         let image = |at: usize| {
             let [kind, size, offset] = [number(at, 4)?, number(at + 4, 4)?, number(at + 8, 4)?];
-            // The first one begins with the file, and the others where they say from here on.
+            // The first image starts the file; the other offsets count from here.
             let first = if offset == 0 { 0 } else { origin.checked_add(offset)? };
             Some(((kind >> 16) as u8, first..first.checked_add(size)?))
         };
@@ -131,7 +131,7 @@ mod tests {
     use image::{GrayImage, ImageFormat, Luma};
     use std::io::Cursor;
 
-    /// A JPEG file of one grey, with a segment.
+    /// A JPEG file with a block of each grey, and a segment.
     fn jpeg(levels: &[u8], segment: Option<(u8, &[u8])>) -> Vec<u8> {
         let mut file = Cursor::new(Vec::new());
         let image = GrayImage::from_fn(8 * levels.len() as u32, 8, |x, _| Luma([levels[x as usize / 8]]));
@@ -144,7 +144,7 @@ mod tests {
         bytes
     }
 
-    /// Images one after the other with a list of their kinds, of either order of bytes.
+    /// Images in sequence with a list of their kinds, in either byte order.
     fn mpo(levels: &[(u8, u8)], highest_first: bool) -> Vec<u8> {
         let number = |v: usize, count: usize| {
             let bytes = (v as u32).to_le_bytes()[..count].to_vec();
@@ -157,7 +157,7 @@ mod tests {
             body.extend([number(16 * sizes.len(), 4), number(26, 4), number(0, 4)].concat());
             let mut start = 0;
             for ((_, kind), size) in levels.iter().zip(sizes) {
-                // The list begins behind the first marker, its own, its length and its name.
+                // The list begins after the first marker, its own marker, its length and its signature.
                 let offset = if start == 0 { 0 } else { start - 10 };
                 body.extend(
                     [number(usize::from(*kind) << 16, 4), number(*size, 4), number(offset, 4), vec![0; 4]]
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn two_images_one_after_the_other_are_views() {
+    fn two_images_in_sequence_are_views() {
         for highest_first in [false, true] {
             assert_eq!(levels("a.mpo", &mpo(&[(60, 3), (200, 2)], highest_first)), Ok([60, 200]));
             // A reduced copy between them.

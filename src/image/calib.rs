@@ -9,7 +9,7 @@ use crate::text::{self, quoted};
 
 pub use super::fit::Fit;
 
-/// A calibration file is a dozen lines; no more than this is read.
+/// The limit for a file; calibration files have a dozen lines.
 const MAX_BYTES: u64 = 1 << 20;
 
 /// The contents of `calib.txt`. Every entry is optional, because the benchmarks leave out different ones.
@@ -34,23 +34,23 @@ pub struct Calibration {
     pub vmax: Option<f64>,
     /// The unit of the baseline, which Middlebury's files do not state: millimetres unless the file has `unit`.
     pub unit: Unit,
-    /// How it became that of images of another size than the file's.
+    /// The scaling or cropping by which it was adapted to other images than the file's.
     pub fit: Option<Fit>,
-    /// Whether the file has the right camera on the left of the left one, so that each was taken for the other.
+    /// Whether the file has the right camera to the left of the left one, so that they were exchanged.
     pub exchanged: bool,
 }
 
 /// The unit of a baseline, and thereby of depths and points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Unit {
-    /// Middlebury's.
+    /// The unit of Middlebury.
     #[default]
     Millimetre,
     /// Hundredths of a metre.
     Centimetre,
-    /// That of ROS and Kalibr.
+    /// The unit of ROS and Kalibr.
     Metre,
-    /// The calibration does not say, as OpenCV's: that of the squares of the chessboard.
+    /// The calibration does not state a unit, as in OpenCV, where it is that of the chessboard.
     Unknown,
 }
 
@@ -58,13 +58,13 @@ impl Unit {
     const ALL: [(&'static str, Self); 4] =
         [("mm", Self::Millimetre), ("cm", Self::Centimetre), ("m", Self::Metre), ("unknown", Self::Unknown)];
 
-    /// Its sign: mm, cm or m, or `unknown`.
+    /// The symbol: mm, cm or m, or `unknown`.
     #[must_use]
     pub fn name(self) -> &'static str {
         Self::ALL.iter().find(|(_, unit)| *unit == self).map_or("", |(name, _)| name)
     }
 
-    /// How many millimetres it has, where that is known.
+    /// The number of millimetres, if known.
     #[must_use]
     pub fn millimetres(self) -> Option<f64> {
         match self {
@@ -88,7 +88,7 @@ impl FromStr for Unit {
 /// The matrix `[fx 0 cx; 0 fy cy; 0 0 1]` of a rectified camera, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Focal length across and down (fx, fy), above 0; usually equal in rectified images.
+    /// Horizontal and vertical focal length (fx, fy), above 0; usually equal in rectified images.
     pub focal_length: [f64; 2],
     /// Principal point (cx, cy): where the optical axis meets the image, relative to the centre of the top
     /// left pixel.
@@ -96,15 +96,15 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A camera of square pixels that looks at the centre of its images: of this focal length, in pixels, and with images of
-    /// (width, height).
+    /// A camera of square pixels with its principal point in the middle of its images: with this focal
+    /// length, in pixels, and images of (width, height).
     #[must_use]
     pub fn centred(focal_length: f64, (width, height): (usize, usize)) -> Self {
         let principal_point = [width, height].map(|count| (count as f64 - 1.0) / 2.0);
         Self { focal_length: [focal_length; 2], principal_point }
     }
 
-    /// The same camera with images of another size.
+    /// The camera for scaled or cropped images.
     pub(crate) fn in_size(&self, fit: &Fit) -> Self {
         let scale = fit.scale();
         Self {
@@ -121,7 +121,7 @@ impl Calibration {
         Self { camera: Some(camera), doffs: Some(0.0), baseline: Some(baseline), unit, ..Self::default() }
     }
 
-    /// The same for images of this (width, height), where these are those of the file in another size; else itself.
+    /// The calibration for images of this (width, height) if they are scaled; otherwise an unchanged copy.
     #[must_use]
     pub fn of_size(&self, size: (usize, usize)) -> Self {
         let known = self.width.zip(self.height).map(|(width, height)| (width as usize, height as usize));
@@ -158,7 +158,7 @@ impl Calibration {
     /// Reads `calib.txt` from the folder of `image`; `None` when there is none.
     ///
     /// # Errors
-    /// As [`Calibration::read`].
+    /// The errors of [`Calibration::read`].
     pub fn beside(image: &Path) -> Result<Option<Self>> {
         let path = image.with_file_name("calib.txt");
         if path.exists() { Self::read(&path).map(Some) } else { Ok(None) }
@@ -175,7 +175,7 @@ impl Calibration {
         Self::of_text(path, &String::from_utf8_lossy(&bytes))
     }
 
-    /// The calibration in the text of a file, which errors call `name`.
+    /// Parses the text of a file, which errors call `name`.
     ///
     /// # Errors
     /// [`Error::Read`] when a value is wrong; the error names the line and the key.
@@ -183,8 +183,8 @@ impl Calibration {
         Self::parse(text).map_err(|reason| Error::read(name, reason))
     }
 
-    /// Whether a text is meant as such a file: whether its first line is an entry, and any of its lines one of a key that is known,
-    /// rightly spelt or not.
+    /// Whether a text is meant to be such a file: its first line is an entry, and some line has a known key,
+    /// even if misspelt.
     pub(crate) fn is_meant(text: &str) -> bool {
         let mut keys = lines(text).map(|(_, line)| line.split_once('=').map(|(key, _)| key.trim()));
         let Some(Some(first)) = keys.next() else { return false };
@@ -194,7 +194,7 @@ impl Calibration {
         is_word && !has_sections && (known(first) || keys.flatten().any(known))
     }
 
-    /// Parses `key=value` lines; those that begin with # are comments. The error names line and key.
+    /// Parses `key=value` lines; lines that begin with # are comments. The error names line and key.
     fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut calibration = Self::default();
         let mut right = None;
@@ -227,7 +227,7 @@ impl Calibration {
                         let wrong = |expected| format!("expected {expected}, found {}", quoted(value));
                         calibration.unit = value.parse().map_err(wrong)?;
                     }
-                    // Of errors and of the ground truth.
+                    // Keys about errors and the ground truth.
                     _ => {}
                 }
                 Ok::<(), String>(())
@@ -244,9 +244,9 @@ impl Calibration {
         Ok(calibration)
     }
 
-    /// The right camera of a rectified pair is the left one, moved by `doffs` along the rows. The error says what contradicts that.
+    /// Checks that the right camera is the left one moved by `doffs` along the rows, or says what differs.
     fn check_right(&self, right: Camera) -> std::result::Result<(), String> {
-        // Files round their numbers.
+        // Tolerates the rounding of files.
         const ROUNDING: f64 = 0.05;
         let Some(left) = self.camera else { return Ok(()) };
         let [f0, f1] = [left, right].map(|camera| camera.focal_length);
@@ -274,7 +274,7 @@ impl Calibration {
         }
     }
 
-    /// The cameras of the rectified pair and their baseline, where it says them all.
+    /// The cameras of the rectified pair and their baseline, if all are known.
     pub(crate) fn cameras(&self) -> Option<([Camera; 2], f64)> {
         let (left, doffs, baseline) = (self.camera?, self.doffs?, self.baseline?);
         let [cx, cy] = left.principal_point;
@@ -282,19 +282,19 @@ impl Calibration {
     }
 }
 
-/// The keys of Middlebury's files and of others that are made like them, and `unit`, which those have not.
+/// The keys of Middlebury's and similar files, and our own `unit`.
 const KEYS: [&str; 15] = [
     "cam0", "cam1", "doffs", "baseline", "width", "height", "ndisp", "vmin", "vmax", "unit", "isint",
     "dyavg", "dymax", "dmin", "dmax",
 ];
 
-/// The lines that are no comments, each with its number.
+/// The lines that are not comments, each with its number.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
-/// The key that is meant by one that is not known.
+/// The known key that is closest to a misspelt one.
 fn near(key: &str) -> Option<&'static str> {
     let most = match key.len() {
         0..=3 => return None,
@@ -370,7 +370,7 @@ mod tests {
     #[test]
     fn reads_the_benchmarks_file() {
         assert_eq!(Calibration::parse(MOTORCYCLE).unwrap(), expected());
-        // As other programs save it.
+        // Variants that other programs save.
         let edited = format!("\u{feff}{}", MOTORCYCLE.replace('\n', "\r\n\r\n").replace('=', " = "));
         assert_eq!(Calibration::parse(&edited).unwrap(), expected());
     }
@@ -448,7 +448,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_camera_in_another_size() {
+    fn images_can_have_another_size() {
         let half = expected().of_size((1482, 1000));
         let camera = Camera { focal_length: [1989.9555; 2], principal_point: [622.136, 509.5035] };
         assert_eq!(half.camera, Some(camera));
@@ -461,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn found_beside_the_image() {
+    fn a_calibration_is_found_beside_the_image() {
         let folder = tempfile::tempdir().unwrap();
         let image = folder.path().join("im0.png");
         assert_eq!(Calibration::beside(&image).unwrap(), None);

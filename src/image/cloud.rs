@@ -1,11 +1,11 @@
-//! Clouds of points, and what their files say of them.
+//! Point clouds.
 
 use super::calib::Unit;
 
 /// A point of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Where it is: x, y, z.
+    /// Its position: x, y, z.
     pub position: [f32; 3],
     /// Red, green, blue.
     pub colour: [u8; 3],
@@ -13,13 +13,13 @@ pub struct Point {
     pub confidence: u8,
 }
 
-/// The camera whose frame points have: x to its right, y down, z forward.
+/// The camera that defines the coordinates of points: x to its right, y down, z forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Frame {
+pub enum PointFrame {
     /// The left camera of the pair that was matched; the rectified one, if the pair has been rectified.
     #[default]
     Matched,
-    /// The left camera before rectification, as it really stands. It has the same centre.
+    /// The original left camera before rectification. It has the same centre.
     Original,
 }
 
@@ -28,26 +28,26 @@ pub enum Frame {
 pub struct Cloud {
     /// The points, row by row of the left image. Positions have the unit of the baseline.
     pub points: Vec<Point>,
-    /// What positions count from.
-    pub frame: Frame,
+    /// The frame of the positions.
+    pub frame: PointFrame,
     /// The unit of positions.
     pub unit: Unit,
 }
 
 impl Cloud {
-    /// What a file says of positions: frame and unit, in one line.
+    /// Describes the positions in one line: frame and unit.
     #[must_use]
     pub fn about(&self) -> String {
         let unit = if self.unit == Unit::Unknown { "that of the baseline" } else { self.unit.name() };
         let camera = match self.frame {
-            Frame::Matched => "the left camera",
-            Frame::Original => "the original left camera, before rectification",
+            PointFrame::Matched => "the left camera",
+            PointFrame::Original => "the original left camera, before rectification",
         };
         format!("frame of {camera}: x right, y down, z forward; unit {unit}")
     }
 }
 
-/// The bytes of a file: a header, and then each point as `record` writes it, in `size` bytes.
+/// Encodes a file: a header, then each point in `size` bytes, as `record` writes it.
 pub(super) fn encoded(
     header: String,
     cloud: &Cloud,
@@ -65,7 +65,7 @@ mod tests {
     use super::super::{pcd, ply};
     use super::*;
 
-    /// The words behind each line of a header that begins with `key`.
+    /// The words after `key` in each line of a header that begins with it.
     fn entries<'a>(header: &'a str, key: &str) -> Vec<&'a str> {
         header.lines().filter_map(|line| line.strip_prefix(key)).flat_map(str::split_whitespace).collect()
     }
@@ -76,7 +76,7 @@ mod tests {
         let other = Point { position: [0.0; 3], colour: [0; 3], confidence: 0 };
         let confidence = 200.0_f32.to_le_bytes();
         let position = [1.5_f32, -2.0, 1e6].map(f32::to_le_bytes).concat();
-        for frame in [Frame::Matched, Frame::Original] {
+        for frame in [PointFrame::Matched, PointFrame::Original] {
             let cloud = Cloud { points: vec![point, other], frame, unit: Unit::Metre };
             let split = |bytes: Vec<u8>, end: &str| {
                 let start =
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn the_frame_is_that_of_a_camera() {
         let about = |frame| Cloud { frame, ..Cloud::default() }.about();
-        assert!(about(Frame::Matched).starts_with("frame of the left camera: x right, y down"));
-        assert!(about(Frame::Original).starts_with("frame of the original left camera, before"));
+        assert!(about(PointFrame::Matched).starts_with("frame of the left camera: x right, y down"));
+        assert!(about(PointFrame::Original).starts_with("frame of the original left camera, before"));
     }
 }

@@ -1,12 +1,12 @@
 //! Interpolation by cubics (Keys 1981, Catmull and Rom), in integers.
 
-/// Places are in 1/256 px.
+/// Positions are in 1/256 px.
 pub(crate) const STEPS: i64 = 256;
-/// The weights of one direction add up to this power of 2.
+/// The weights of one direction sum to this power of 2.
 pub(crate) const BITS: u32 = 14;
 
-/// The weights of the pixels -1, 0, 1 and 2 for every place between 0 and 1: the cubic of Catmull and Rom, exactly, then
-/// rounded.
+/// The weights of the pixels -1, 0, 1 and 2 for every position between 0 and 1: the exact cubic of Catmull
+/// and Rom, rounded.
 pub(crate) const WEIGHTS: [[i32; 4]; STEPS as usize] = {
     let mut all = [[0; 4]; STEPS as usize];
     let mut i = 0;
@@ -22,7 +22,7 @@ pub(crate) const WEIGHTS: [[i32; 4]; STEPS as usize] = {
             sum += weights[tap];
             tap += 1;
         }
-        // What rounding has changed goes to the largest.
+        // The rounding error goes to the largest weight.
         weights[if 2 * i <= STEPS { 1 } else { 2 }] += (1 << BITS) - sum;
         all[i as usize] = weights;
         i += 1;

@@ -1,4 +1,4 @@
-//! Decoding image files: detecting their kind from their first bytes, and reading their samples as stored.
+//! Decodes image files: detects their kind from their first bytes, and reads their samples as stored.
 
 use std::cell::Cell;
 use std::io::Cursor;
@@ -15,12 +15,12 @@ use crate::error::{ReadError, Result};
 use crate::memory::{self, Claim};
 use crate::text::one_line;
 
-/// As [`MAX_PIXELS_PER_BYTE`], for uncompressed files, whose smallest pixel is one bit.
+/// Like [`MAX_PIXELS_PER_BYTE`], for uncompressed files, whose smallest pixel is one bit.
 const MAX_PLAIN_PIXELS_PER_BYTE: u64 = 8;
 
 /// The bytes of a file that begins like an image and is not too large for an image of `max_pixels` pixels.
 pub(super) fn load(path: &Path, max_pixels: u64) -> Result<Vec<u8>> {
-    file::load(path, max_pixels, |bytes| Kind::of(bytes).is_none().then(|| unknown(bytes)))
+    file::load(path, max_pixels, |bytes| Kind::detect(bytes).is_none().then(|| unknown(bytes)))
 }
 
 /// The kind of a file.
@@ -34,7 +34,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    pub(super) fn of(bytes: &[u8]) -> Option<Self> {
+    pub(super) fn detect(bytes: &[u8]) -> Option<Self> {
         if pfm::is_pfm(bytes) {
             return Some(Self::Pfm);
         }
@@ -45,12 +45,12 @@ impl Kind {
             return Some(Self::Npz);
         }
         Some(match bytes {
-            // A raw photograph, of which only its preview would be read.
+            // A raw photograph, of which only the preview would be read.
             [b'I', b'I', 42, 0, _, _, _, _, b'C', b'R', ..] => return None,
             [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Self::Tiff,
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Self::Coded(ImageFormat::Png),
             [0xff, 0xd8, 0xff, ..] => Self::Coded(ImageFormat::Jpeg),
-            // Behind the size of the file there is nothing, and the first head says how long it is.
+            // The four bytes after the file size are reserved.
             [b'B', b'M', _, _, _, _, 0, 0, 0, 0, ..] => Self::Coded(ImageFormat::Bmp),
             [b'P', b'1'..=b'7', c, ..] if c.is_ascii_whitespace() || *c == b'#' => {
                 Self::Coded(ImageFormat::Pnm)
@@ -60,7 +60,7 @@ impl Kind {
     }
 }
 
-/// What a file is that is not read, by bytes at a place in it, and what to do about that.
+/// Unsupported kinds of files: offset, magic bytes, name, and remedy.
 const FOREIGN: [(usize, &[u8], &str, &str); 35] = [
     (8, b"AVI ", "a film", FILM),
     (8, b"CR\x02", "a raw photograph", RAW),
@@ -114,9 +114,9 @@ fn unknown(bytes: &[u8]) -> String {
     }
 }
 
-/// Decodes a whole file; the error is one line. Memory for pixels is allocated only once the header is known
-/// to claim no more than `max_pixels`, and no more than the file can hold. Pixels whose samples are all
-/// `no_data` are marked; without it, the no-data value of a TIFF file is used.
+/// Decodes a whole file; the error is one line. Memory for pixels is allocated only if the header claims at
+/// most `max_pixels`, and no more than the file can hold. Pixels whose samples are all `no_data` are marked;
+/// without it, the no-data value of a TIFF file is used.
 pub(super) fn decode(
     bytes: &[u8],
     max_pixels: u64,
@@ -126,7 +126,7 @@ pub(super) fn decode(
         Some(value) => Ok(raster.marked(value)?),
         None => Ok(raster),
     };
-    guarded(|| match Kind::of(bytes) {
+    guarded(|| match Kind::detect(bytes) {
         Some(Kind::Pfm) => decode_pfm(bytes, max_pixels).and_then(marked),
         Some(Kind::Tiff) => tiff::decode(bytes, max_pixels, no_data),
         Some(Kind::Npy) => npy::decode(bytes, max_pixels).and_then(marked),
@@ -207,9 +207,9 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
     let plain = format == ImageFormat::Pnm;
     let per_byte = if plain { MAX_PLAIN_PIXELS_PER_BYTE } else { MAX_PIXELS_PER_BYTE };
     check_claim((width.into(), height.into()), max_pixels, per_byte, bytes.len())?;
-    // The decoder holds rows and their filtered copies besides its pixels.
+    // The decoder holds rows and their filtered copies in addition to its pixels.
     let _claim = Claim::new(2 * decoder.total_bytes())?;
-    // A damaged one says nothing of the pixels.
+    // Ignore damaged EXIF data, which does not affect the pixels.
     let exif = decoder.exif_metadata().ok().flatten();
     let orientation = exif.map_or(Orientation::UPRIGHT, |data| Orientation::of_exif(&data));
     let (colour, size) = (decoder.color_type(), (width as usize, height as usize));
@@ -222,7 +222,7 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
     Ok(Raster { orientation, ..Raster::of(size, channels, samples) })
 }
 
-/// All samples, which have this type.
+/// Reads all samples, as values of this type.
 fn filled<S: Sample + bytemuck::Pod>(decoder: impl ImageDecoder) -> Result<Samples<'static>, ReadError> {
     let bytes = usize::try_from(decoder.total_bytes()).unwrap_or(usize::MAX);
     let mut samples = memory::filled(bytes / size_of::<S>(), S::zeroed())?;
@@ -261,12 +261,12 @@ mod tests {
         assert_eq!(guarded(|| Err::<(), _>("told".into())), Err("told".into()));
     }
 
-    /// Each foreign file is named, with a way out; none of them is taken for one that is read.
+    /// Each foreign file is named with a remedy, and none of them is mistaken for a supported kind.
     #[test]
     fn foreign_files_are_named() {
         for (at, magic, what, remedy) in FOREIGN {
             let bytes = [&vec![0; at][..], magic, &[0; 64]].concat();
-            assert_eq!(Kind::of(&bytes), None, "{what}");
+            assert_eq!(Kind::detect(&bytes), None, "{what}");
             assert_eq!(unknown(&bytes), format!("is {what}, which is not read here: {remedy}"));
         }
         assert!(

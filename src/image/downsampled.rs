@@ -1,4 +1,4 @@
-//! Images at half their size.
+//! Downsamples images to half their size.
 
 use super::{Image, Pixel, Plane};
 use crate::threads;
@@ -39,7 +39,7 @@ impl Image {
         })
     }
 
-    /// A row of the result from these `rows`, without masked pixels.
+    /// Computes a row of the result from these `rows`, without masked pixels.
     fn low_pass_masked(&self, rows: [usize; 5], masked: &[bool], out: &mut [Pixel]) {
         let width = self.pixels.width();
         // Vertical sums of each column, and the sums of their weights.
@@ -64,7 +64,7 @@ impl Image {
     }
 }
 
-/// The same where nothing is masked; `room` is room for sums.
+/// Like `low_pass_masked`, without masked pixels; `room` is scratch memory.
 #[pulp::with_simd(low_pass = crate::vectors::widest())]
 #[inline(always)]
 fn low_pass_on<'a, S: pulp::Simd>(
@@ -74,7 +74,7 @@ fn low_pass_on<'a, S: pulp::Simd>(
     out: &'a mut [Pixel],
 ) {
     let width = rows[0].len() / 4;
-    // Vertical sums of each column, with two more at either end, which repeat the last one.
+    // Vertical sums of each column, with two more columns at either end that repeat the last.
     room.resize(width + 4, [0; 4]);
     let sums = &mut bytemuck::cast_slice_mut::<_, u32>(room)[8..8 + 4 * width];
     let [above, over, here, under, below] = rows.map(|row| &row[..4 * width]);
@@ -99,9 +99,9 @@ fn low_pass_on<'a, S: pulp::Simd>(
 mod tests {
     use super::*;
 
-    /// Where nothing is masked, the quick way gives what the other does.
+    /// Without masked pixels, the fast path gives the same result as the other one.
     #[test]
-    fn both_ways_agree() {
+    fn the_fast_path_agrees_with_the_masked_one() {
         for (width, height) in [(37, 22), (2, 2), (1, 9), (8, 1), (5, 3)] {
             let noise =
                 |x: usize, y: usize| (x as u32 * 7919 + y as u32 * 104_729 + 9).wrapping_mul(0x9e37_79b9);

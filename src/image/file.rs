@@ -1,4 +1,4 @@
-//! Image files before they are decoded: their bytes, and the limits on the claims of their headers.
+//! Reads the bytes of image files, and limits the claims of their headers.
 
 use std::fs::{self, File};
 use std::io::Read;
@@ -8,11 +8,10 @@ use crate::error::{Error, Purpose, ReadError, Result};
 use crate::memory;
 use crate::text::one_line;
 
-/// Largest number of pixels of an image unless the caller gives another: as many as 16,384 x 16,384.
+/// Default limit for the number of pixels of an image: 16,384 x 16,384.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
-/// No codec here packs more pixels than this into a byte. A header that claims more is wrong, and memory
-/// would be allocated for nothing.
+/// No supported codec packs more pixels into a byte, so a header that claims more is wrong.
 pub(super) const MAX_PIXELS_PER_BYTE: u64 = 10_000;
 
 /// Largest number of bytes per pixel: four channels of the widest kind.
@@ -27,8 +26,7 @@ pub(super) fn max_bytes_of(pixels: u64) -> u64 {
 }
 
 /// The bytes of a file, unless it is too large for an image of `max_pixels` pixels. `refused` gets the first
-/// bytes and returns the reason why such a file is not read. This avoids reading a file that is large or
-/// endless.
+/// bytes, and returns a reason not to read the rest, which may be large or endless.
 pub(super) fn load(
     path: &Path,
     max_pixels: u64,
@@ -58,7 +56,7 @@ pub(super) fn load(
     Ok(bytes)
 }
 
-/// Fails when an image of this size will not be read: it has no pixel, or more than `max_pixels`.
+/// Fails for images without pixels, and with more than `max_pixels`.
 pub(super) fn check_size(width: u64, height: u64, max_pixels: u64) -> Result<(), ReadError> {
     if width == 0 || height == 0 {
         return Err(format!("is {width} x {height} and holds no pixel").into());
@@ -69,8 +67,8 @@ pub(super) fn check_size(width: u64, height: u64, max_pixels: u64) -> Result<(),
     Ok(())
 }
 
-/// As [`check_size`], and fails when `bytes` bytes cannot hold this many pixels, with at most `per_byte`
-/// pixels per byte.
+/// Like [`check_size`]; also fails when `bytes` bytes cannot hold so many pixels, at `per_byte` pixels per
+/// byte.
 pub(super) fn check_claim(
     (width, height): (u64, u64),
     max_pixels: u64,
@@ -87,7 +85,7 @@ pub(super) fn check_claim(
     Ok(())
 }
 
-/// The error for a file that does not decode, with the remedy.
+/// The error for a file that cannot be decoded, with the remedy.
 pub(super) fn damaged(e: impl std::fmt::Display) -> ReadError {
     let reason = one_line(&e.to_string());
     format!("{reason}; truncated or damaged? get the file again, or convert it to PNG").into()

@@ -1,27 +1,27 @@
-//! Images of one camera in another size.
+//! Images that are scaled or cropped from those of a calibration.
 
 use std::fmt;
 
 use super::Rect;
 
-/// How images of a camera come out of those that its calibration is of: all of them or a part, which may be scaled.
+/// The mapping from the images of a calibration to others of the same camera: all or part of them, possibly scaled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Width and height of the images that the calibration is of.
+    /// Width and height of the calibrated images.
     pub calibrated: (usize, usize),
-    /// Width and height of the images that it is taken for.
+    /// Width and height of the other images.
     pub size: (usize, usize),
-    /// Where these begin in the others, in pixels from the outer corner of those.
+    /// The origin of the other images in the calibrated ones, in pixels from their outer corner.
     origin: [f64; 2],
-    /// Pixels of these to one of the others, across and down.
+    /// Pixels of the other images per calibrated pixel, horizontally and vertically.
     scale: [f64; 2],
 }
 
 impl Fit {
-    /// The whole images, scaled; `None` where the sizes have not one aspect.
+    /// The whole images, scaled; `None` if the aspect ratios differ.
     #[must_use]
     pub fn scaled(calibrated: (usize, usize), size: (usize, usize)) -> Option<Self> {
-        /// An image that lacks a row is no smaller one whose rows were rounded.
+        /// The least difference of the scale from 1: an image that lacks a row is not a scaled one.
         const LEAST: f64 = 0.1;
         let scale = ratios(calibrated, size);
         let [width, height] = [calibrated.0, calibrated.1].map(|side| side as f64);
@@ -37,13 +37,13 @@ impl Fit {
         })
     }
 
-    /// The middle of the images, scaled until it fills these.
+    /// The middle of the images, scaled to fill the others.
     pub(crate) fn middle(calibrated: (usize, usize), size: (usize, usize)) -> Self {
         let [across, down] = ratios(calibrated, size);
         Self::around_middle(calibrated, size, across.max(down))
     }
 
-    /// The images with their middle in the middle of these, scaled to the same width.
+    /// The images centred in the others, and scaled to the same width.
     pub(crate) fn centred(calibrated: (usize, usize), size: (usize, usize)) -> Self {
         Self::around_middle(calibrated, size, ratios(calibrated, size)[0])
     }
@@ -54,18 +54,18 @@ impl Fit {
         Self { calibrated, size, origin, scale: [scale; 2] }
     }
 
-    /// A part of the images, as it is.
+    /// An unscaled part of the images.
     pub(crate) fn part(part: &Rect) -> Self {
         let (size, origin) = (part.size(), [part.x.start, part.y.start].map(|v| v as f64));
         Self { calibrated: size, size, origin, scale: [1.0; 2] }
     }
 
-    /// Where a place of the calibrated images is in these. Both count from the centre of the top left pixel.
+    /// Maps a position in the calibrated images. Both positions count from the centre of the top left pixel.
     pub(crate) fn place(&self, at: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|i| (at[i] + 0.5 - self.origin[i]) * self.scale[i] - 0.5)
     }
 
-    /// Pixels of these to one of the calibrated images, across and down.
+    /// Pixels of the other images per calibrated pixel, horizontally and vertically.
     pub(crate) fn scale(&self) -> [f64; 2] {
         self.scale
     }
@@ -76,7 +76,7 @@ fn ratios(calibrated: (usize, usize), size: (usize, usize)) -> [f64; 2] {
 }
 
 impl fmt::Display for Fit {
-    /// As what follows the name of a calibration.
+    /// Continues a sentence that begins with the calibration.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self { calibrated: (width, height), size: (w, h), origin, scale } = *self;
         write!(f, "is for images of {width} x {height}: those of {w} x {h} count as ")?;
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn pixels_are_scaled_about_the_outer_corner() {
         let half = Fit::scaled((1280, 960), (640, 480)).unwrap();
-        // The middle of both, and the centre of the first two pixels in each direction.
+        // The middle of both, and the middle between the first two pixels in each direction.
         assert!(is_near(half.place([639.5, 479.5]), [319.5, 239.5]));
         assert!(is_near(half.place([0.5, 0.5]), [0.0, 0.0]));
     }
@@ -134,7 +134,7 @@ mod tests {
             of((1280, 720)).to_string(),
             "is for images of 1280 x 800: those of 1280 x 720 count as the middle of them"
         );
-        // By 0.6, as 480 is to 800.
+        // Scaled by 0.6, as 480 is to 800.
         let narrow = of((640, 480));
         assert!(is_near(narrow.place([639.5, 399.5]), [319.5, 239.5]));
         assert!(narrow.to_string().ends_with("count as their middle 1067 x 800, scaled"), "{narrow}");

@@ -1,4 +1,4 @@
-//! Where the pixels of an image lie on the ground.
+//! The position of the pixels of an image on the ground.
 
 use std::fmt;
 use std::sync::Arc;
@@ -8,8 +8,8 @@ use tiff::tags::{Tag, Type};
 /// 92 numbers: two errors, offsets and scales of line, sample, latitude, longitude and height, and four times 20 coefficients.
 pub(super) const RATIONAL_POLYNOMIALS: Tag = Tag::Unknown(50_844);
 
-/// Where the pixels of an image lie on the ground: the tags of GeoTIFF, with rational polynomials. They are copied and not
-/// interpreted, but for where the pixels begin. Clones share them.
+/// The position of an image's pixels on the ground: the tags of GeoTIFF, with rational polynomials. Tags are
+/// copied; only the position of the first pixel is interpreted. Clones share them.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Georeference {
     pub(super) fields: Arc<[Field]>,
@@ -25,7 +25,7 @@ pub(super) struct Field {
 }
 
 impl Georeference {
-    /// That of the part of the image whose first pixel is (x, y).
+    /// The georeference of the part of the image whose first pixel is (x, y).
     pub(super) fn moved(&self, x: usize, y: usize) -> Self {
         let fields = self.fields.iter().map(|field| field.moved(x as f64, y as f64));
         Self { fields: fields.collect() }
@@ -40,7 +40,7 @@ impl Field {
         }
         let mut values: Vec<f64> = bytemuck::pod_collect_to_vec(&self.bytes);
         match self.tag {
-            // Column, row and height of a pixel, and its place on the ground.
+            // Column, row and height of a pixel, and its position on the ground.
             Tag::ModelTiepointTag => values.chunks_exact_mut(6).for_each(|tie| {
                 tie[0] -= x;
                 tie[1] -= y;

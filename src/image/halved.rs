@@ -1,11 +1,10 @@
-//! Pairs at half their size, which keep the full one.
+//! Pairs at half their size, which keep the full-size pair.
 
 use super::{Image, Pair, Pixel, Plane};
 use crate::threads::prelude::*;
 
 impl Image {
-    /// The image with as many columns and rows as make whole blocks of 2 x 2 pixels: the last ones are there twice where they are
-    /// odd.
+    /// Extends the image to an even number of columns and rows by repeating the last ones.
     fn in_blocks(&self) -> Self {
         fn in_blocks<T: Copy>(plane: &Plane<T>) -> Plane<T> {
             let (width, height) = plane.size();
@@ -21,8 +20,8 @@ impl Image {
         Self { pixels: in_blocks(&self.pixels), masked: in_blocks(&self.masked) }
     }
 
-    /// The image, which is in whole blocks, at half its size: a pixel is the mean of the unmasked pixels of its block of 2 x 2,
-    /// rounded to the nearest value, a half up, and masked where all four are.
+    /// Halves the size of an image of even size: a pixel is the mean of the unmasked pixels of its 2 x 2
+    /// block, rounded to the nearest value, halves up, and masked if all four are.
     fn halved(&self) -> Self {
         let (w, h) = (self.width() / 2, self.height() / 2);
         let mut pixels = vec![[0; 4]; w * h];
@@ -43,7 +42,7 @@ impl Image {
         Self { pixels: Plane::new(w, h, pixels), masked: Plane::new(w, h, masked) }
     }
 
-    /// The mean of the unmasked pixels of a block, and whether there are none.
+    /// The mean of the unmasked pixels of a block, and whether all are masked.
     fn mean_of_unmasked(&self, x: usize, y: usize) -> (Pixel, bool) {
         let places = [0, 1].map(|j| [0, 1].map(|i| (2 * x + i, 2 * y + j)));
         let (mut sums, mut count) = ([0; 4], 0);
@@ -70,8 +69,8 @@ fn means_on<'a, S: pulp::Simd>(_: S, rows: [&'a [Pixel]; 2], out: &'a mut [Pixel
 }
 
 impl Pair {
-    /// The pair at half its size, which knows this one, in whole blocks, as its [full](Self::full) size: a pixel is the mean of a
-    /// block, so a disparity is half of what it is there.
+    /// The pair at half its size, with this pair, extended to an even size, as its [full](Self::full) size. A
+    /// pixel is the mean of a block, so disparities are halved.
     #[must_use]
     pub fn halved(&self) -> Self {
         let (width, height) = self.size();
@@ -92,7 +91,7 @@ mod tests {
         Image { pixels, masked: Plane::filled(width, height, false) }
     }
 
-    /// Where nothing is masked, the quick way gives what the other does; a masked pixel does not count.
+    /// The fast path equals the general one without masked pixels; a masked pixel does not count.
     #[test]
     fn a_pixel_is_the_mean_of_its_block() {
         for (width, height) in [(36, 22), (2, 2), (2, 8), (40, 2)] {
@@ -114,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_sizes_become_whole_blocks_and_parts_stay_together() {
+    fn odd_sizes_are_extended_and_crops_include_the_full_pair() {
         let pair = Pair::new(noise(7, 5), noise(7, 5)).unwrap();
         let half = pair.halved();
         let full = half.full().unwrap();
@@ -123,7 +122,7 @@ mod tests {
         let part = half.crop(&super::super::Rect { x: 1..3, y: 1..2 });
         assert_eq!(part.full().unwrap().size(), (4, 2));
         assert_eq!(part.full().unwrap().left().pixels[(0, 0)], full.left().pixels[(2, 2)]);
-        // A mirror image of half the size is half the size of the mirror image.
+        // Mirroring and halving commute.
         let mirrored = half.mirrored();
         assert_eq!(mirrored.clone().with_full(None), mirrored.full().unwrap().map(Image::halved));
     }

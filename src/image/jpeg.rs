@@ -1,5 +1,5 @@
-//! JPEG files. The decoder runs in strict mode: by default it silently replaces missing or damaged parts with
-//! grey. What it does not notice even so is a doubt about the image.
+//! JPEG files. The decoder runs in strict mode, because by default it silently replaces missing or damaged
+//! parts with grey. Damage that it misses even so is reported as a doubt about the image.
 
 mod scan;
 
@@ -16,16 +16,16 @@ use super::raster::{Raster, Samples};
 use crate::error::ReadError;
 use crate::memory::{self, Claim};
 
-/// Largest number of bytes per pixel that the decoder takes besides the samples: the coefficients of a
-/// progressive image, and intermediate rows.
+/// Most bytes per pixel that the decoder needs in addition to the samples: the coefficients of a progressive
+/// image, and intermediate rows.
 const BYTES_BESIDE: u64 = 10;
 
 /// Decodes a file of at most `max_pixels` pixels.
 ///
 /// # Errors
-/// What is wrong with the file, in one line.
+/// The fault of the file, in one line.
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, ReadError> {
-    // The decoder takes the end of the file for the end of the pixels.
+    // The decoder accepts a truncated file.
     if !is_whole(bytes) {
         return Err(damaged("the JPEG data ends too early"));
     }
@@ -52,7 +52,7 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
     Ok(Raster { orientation, doubt, ..Raster::of(size, channels, Samples::Byte(samples.into())) })
 }
 
-/// The segments before the first scan: the kind of each, and where its data is.
+/// The segments before the first scan: the kind and the place of each.
 pub(super) fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, Range<usize>)> + '_ {
     let mut at = if bytes.starts_with(&[0xff, 0xd8]) { 2 } else { bytes.len() };
     std::iter::from_fn(move || {
@@ -63,7 +63,7 @@ pub(super) fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, Range<usize>)>
     })
 }
 
-/// The error of the decoder, which prints some values in Rust's debug format.
+/// The error of the decoder, without Rust's debug format.
 fn reason(e: impl std::fmt::Display) -> ReadError {
     damaged(e.to_string().trim_matches('"').trim_start_matches("[strict-mode]: "))
 }

@@ -56,14 +56,14 @@ impl Rect {
         (self.x.len(), self.y.len())
     }
 
-    /// The same pixels, relative to the first column and row of `outer`, which contains them.
+    /// The same rectangle relative to the origin of `outer`, which contains it.
     #[must_use]
     pub fn within(&self, outer: &Self) -> Self {
         let (dx, dy) = (outer.x.start, outer.y.start);
         Self { x: self.x.start - dx..self.x.end - dx, y: self.y.start - dy..self.y.end - dy }
     }
 
-    /// Its position in an image `width` pixels wide after left and right are exchanged.
+    /// The mirrored rectangle in an image of this `width`.
     #[must_use]
     pub fn mirrored(&self, width: usize) -> Self {
         Self { x: width - self.x.end..width - self.x.start, y: self.y.clone() }
@@ -139,7 +139,7 @@ impl<T> Plane<T> {
     /// The values of these rows, mutable.
     ///
     /// # Panics
-    /// When there are not as many rows.
+    /// When there are fewer rows.
     pub fn rows_mut(&mut self, rows: Range<usize>) -> &mut [T] {
         &mut self.data[rows.start * self.width..rows.end * self.width]
     }
@@ -185,7 +185,7 @@ impl<T: Clone> Plane<T> {
         Self { width: self.width, height: self.height, data: rows.concat() }
     }
 
-    /// The plane with rows for columns.
+    /// The plane with rows and columns exchanged.
     #[must_use]
     pub fn transposed(&self) -> Self {
         Self::from_fn(self.height, self.width, |x, y| self[(y, x)].clone())
@@ -198,7 +198,7 @@ impl<T: Clone> Plane<T> {
         Self { width: part.x.len(), height: part.y.len(), data: rows.concat() }
     }
 
-    /// The part of (width, height) from the top left.
+    /// The top left part of (width, height) pixels.
     #[must_use]
     pub(crate) fn cut_to(mut self, (width, height): (usize, usize)) -> Self {
         if self.width == width {
@@ -231,8 +231,8 @@ impl<T> std::ops::IndexMut<(usize, usize)> for Plane<T> {
     }
 }
 
-/// One pixel as the matcher sees it: red, green, blue and grey, each in 1/256 of an 8-bit level (0 ..= 65280
-/// from 8-bit files, 0 ..= 65535 at most).
+/// A pixel for the matcher: red, green, blue and grey, each in 1/256 of an 8-bit level (0 ..= 65280 from
+/// 8-bit files, 0 ..= 65535 at most).
 pub type Pixel = [u16; 4];
 
 /// An image with its mask.
@@ -240,7 +240,7 @@ pub type Pixel = [u16; 4];
 pub struct Image {
     /// Colour and grey of each pixel.
     pub pixels: Plane<Pixel>,
-    /// `true` where a pixel carries no information: its value is never read.
+    /// `true` for pixels without information, whose values are never read.
     pub masked: Plane<bool>,
 }
 
@@ -271,14 +271,14 @@ impl Image {
     /// Whether any pixel is masked.
     #[must_use]
     pub(crate) fn any_masked(&self) -> bool {
-        // Without a branch for each pixel, vectors do this.
+        // Without a branch per pixel, this uses vector instructions.
         self.masked.data().chunks(1024).any(|some| some.iter().fold(false, |any, masked| any | masked))
     }
 
     /// Whether all colours are whole 8-bit levels.
     #[must_use]
     pub(crate) fn holds_bytes(&self) -> bool {
-        // Without a branch for each pixel, vectors do this.
+        // Without a branch per pixel, this uses vector instructions.
         let parts = |some: &[Pixel]| some.iter().fold(0, |all, [r, g, b, _]| all | r | g | b) & 0xff;
         self.pixels.data().chunks(1024).all(|some| parts(some) == 0)
     }
@@ -295,7 +295,7 @@ impl Image {
         Self { pixels: self.pixels.flipped(), masked: self.masked.flipped() }
     }
 
-    /// The image with rows for columns.
+    /// The image with rows and columns exchanged.
     #[must_use]
     pub fn transposed(&self) -> Self {
         Self { pixels: self.pixels.transposed(), masked: self.masked.transposed() }
@@ -307,7 +307,7 @@ impl Image {
         Self { pixels: self.pixels.crop(part), masked: self.masked.crop(part) }
     }
 
-    /// The image with masked pixels on its right and below it, up to this (width, height).
+    /// Extends the image to this (width, height) with masked pixels on its right and below.
     fn extended_to(self, (width, height): (usize, usize)) -> Self {
         if self.pixels.size() == (width, height) {
             return self;
@@ -346,7 +346,7 @@ pub struct Pair {
     orientations: [Orientation; 2],
     doubts: [Option<String>; 2],
     full: Option<Box<Pair>>,
-    /// (width, height) of both images, without what is masked because the other one is larger.
+    /// (width, height) of each image, without the masked extension to the size of the larger one.
     own_sizes: [(usize, usize); 2],
 }
 
@@ -382,33 +382,33 @@ impl Pair {
         }
     }
 
-    /// The georeferences of the left and the right image, where they are from TIFF files that have one; maps have the pixels
-    /// of the image, and so its georeference. Mirror images of a pair have none.
+    /// The georeferences of the left and the right image, if they come from TIFF files with one. Maps have
+    /// the pixels of their image, and so its georeference. Mirrored pairs have none.
     #[must_use]
     pub fn georeferences(&self) -> [Option<Georeference>; 2] {
         self.georeferences.clone()
     }
 
-    /// How the left and the right image are turned by the tags of their files: upright where [`read::Reader::orient`] has turned them.
-    /// Parts and mirror images of a pair count as upright.
+    /// The orientation tags of the files of both images: upright if [`read::Reader::orient`] has applied
+    /// them. Parts and mirrored pairs count as upright.
     #[must_use]
     pub fn orientations(&self) -> [Orientation; 2] {
         self.orientations
     }
 
-    /// Why a part of the left and of the right image may be wrong, each with the name of its file: see [`raster::Raster::doubt`]. Mirror
-    /// images of a pair have no doubts.
+    /// Why a part of the left and of the right image may be wrong, each with the name of its file: see
+    /// [`raster::Raster::doubt`]. Mirrored pairs have no doubts.
     #[must_use]
     pub fn doubts(&self) -> &[Option<String>; 2] {
         &self.doubts
     }
 
-    /// The same pair with the doubts about another one, of which it was made.
+    /// The same pair with the doubts of the pair that it was made from.
     pub(crate) fn doubted_as(self, other: &Self) -> Self {
         Self { doubts: other.doubts.clone(), ..self }
     }
 
-    /// The pair with the right view in the place of the left one.
+    /// The pair with its views exchanged.
     #[must_use]
     pub fn exchanged(mut self) -> Self {
         std::mem::swap(&mut self.left, &mut self.right);
@@ -426,7 +426,7 @@ impl Pair {
         &self.left
     }
 
-    /// Both views, to change; what other pairs share is copied.
+    /// Both views, mutable; shared images are copied.
     pub(crate) fn views_mut(&mut self) -> [&mut Image; 2] {
         [Arc::make_mut(&mut self.left), Arc::make_mut(&mut self.right)]
     }
@@ -437,27 +437,27 @@ impl Pair {
         &self.right
     }
 
-    /// The pair seen in a mirror: the mirrored right view takes the place of the left one, and disparities
-    /// stay the same.
+    /// The mirrored pair: the mirrored right view takes the place of the left one, so disparities keep their
+    /// values.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         let full = self.full.as_ref().map(|full| Box::new(full.mirrored()));
         Self { full, ..Self::without_georeference(self.right.mirrored(), self.left.mirrored()) }
     }
 
-    /// A pair of what `f` makes of each view, of one size.
+    /// Applies `f` to each view; the results must have the same size.
     pub(crate) fn map(&self, f: impl Fn(&Image) -> Image + Sync) -> Self {
         let (left, right) = threads::join(|| f(&self.left), || f(&self.right));
         Self::without_georeference(left, right).doubted_as(self)
     }
 
-    /// The pair at its full size, where this one is [at half of that](Self::halved).
+    /// The pair at its full size, if this one was [halved](Self::halved).
     #[must_use]
     pub fn full(&self) -> Option<&Self> {
         self.full.as_deref()
     }
 
-    /// The same pair, at half the size of `full`.
+    /// The same pair, as half the size of `full`.
     pub(crate) fn with_full(self, full: Option<Self>) -> Self {
         Self { full: full.map(Box::new), ..self }
     }
@@ -484,7 +484,7 @@ impl Pair {
         Self { georeferences, full, ..self.map(|view| view.crop(part)) }
     }
 
-    /// (width, height) of the left and the right image. They differ in a [pair of raw images](Pair::of_raw_frames) alone.
+    /// (width, height) of the left and the right image, which differ only in a [pair of raw images](Pair::of_raw_frames).
     #[must_use]
     pub fn own_sizes(&self) -> [(usize, usize); 2] {
         self.own_sizes

@@ -12,11 +12,11 @@ use crate::error::ReadError;
 use crate::memory;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
-/// How a ZIP archive begins, which `.npz` is, and its parts: the list of its files, and the end of that.
+/// Signatures in a ZIP archive (`.npz`): of a file, of an entry of the file list, and of its end.
 const ARCHIVE: &[u8] = b"PK\x03\x04";
 const ENTRY: &[u8] = b"PK\x01\x02";
 const END: &[u8] = b"PK\x05\x06";
-/// Longest header: of an array of numbers it has less than 200 bytes.
+/// Longest accepted header; headers of plain arrays have less than 200 bytes.
 const MOST_HEADER: usize = 1 << 16;
 
 pub(super) fn is_npy(bytes: &[u8]) -> bool {
@@ -27,9 +27,9 @@ pub(super) fn is_npz(bytes: &[u8]) -> bool {
     bytes.starts_with(ARCHIVE)
 }
 
-/// The image in an array of rows of pixels, of numbers or of 1 to 4 channels.
+/// Decodes an array of rows of pixels, of single numbers or of 1 to 4 channels.
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, ReadError> {
-    let header = Header::of(bytes)?;
+    let header = Header::parse(bytes)?;
     let (size, channels) = header.image()?;
     file::check_size(size.0 as u64, size.1 as u64, max_pixels)?;
     let count = size.0 * size.1 * channels;
@@ -45,7 +45,7 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
         )
         .into());
     }
-    // Where the value of a row, a column and a channel stands.
+    // The steps from one row, column and channel to the next.
     let steps =
         if header.by_columns { [1, size.1, size.0 * size.1] } else { [size.0 * channels, channels, 1] };
     let places = (0..size.1).flat_map(move |y| {
@@ -56,12 +56,12 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
     Ok(Raster::of(size, channels, samples))
 }
 
-/// The same of the only array in an archive.
+/// Decodes the only array of an archive.
 pub(super) fn decode_archive(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, ReadError> {
     decode(&only_array(bytes, max_pixels)?, max_pixels)
 }
 
-/// Numbers of an array.
+/// The number type of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Bool,
@@ -71,7 +71,7 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(word: &str) -> Option<Self> {
+    fn parse(word: &str) -> Option<Self> {
         let (kind, bytes) = word.split_at_checked(1)?;
         let bytes = bytes.parse().ok()?;
         match (kind, bytes) {
@@ -90,7 +90,7 @@ impl Kind {
         }
     }
 
-    /// The samples of all `values`, as many as `count`.
+    /// Converts `values`, of which there are `count`, to samples.
     fn samples<'a>(
         self,
         values: impl Iterator<Item = &'a [u8]>,
@@ -102,7 +102,7 @@ impl Kind {
             out.extend(values);
             Ok(out)
         }
-        // The bits of a number, whatever its order.
+        // The bits of each number in native order.
         let bits = values.map(|value| {
             let add = |all: u64, byte: &u8| all << 8 | u64::from(*byte);
             if highest_first { value.iter().fold(0, add) } else { value.iter().rev().fold(0, add) }
@@ -126,19 +126,19 @@ impl Kind {
     }
 }
 
-/// What stands before the numbers.
+/// The header of an array.
 struct Header {
     kind: Kind,
     highest_first: bool,
-    /// Whether the numbers of a column, not those of a row, are next to each other.
+    /// Whether columns, not rows, are contiguous (Fortran order).
     by_columns: bool,
     shape: Vec<usize>,
-    /// Bytes of it.
+    /// Its length in bytes.
     length: usize,
 }
 
 impl Header {
-    fn of(bytes: &[u8]) -> Result<Self, ReadError> {
+    fn parse(bytes: &[u8]) -> Result<Self, ReadError> {
         let cut = || damaged("the header of the array is cut off");
         let rest = bytes.strip_prefix(MAGIC).ok_or_else(cut)?;
         let (start, length) = match rest {
@@ -162,11 +162,11 @@ impl Header {
             Some(text[at..].trim_start())
         };
         let wrong = || damaged("the header of the array makes no sense");
-        // Structures begin with a bracket.
+        // Structured types begin with a bracket.
         let kind = value("descr").ok_or_else(wrong)?;
         let kind = kind.strip_prefix('\'').and_then(|kind| kind.split('\'').next()).unwrap_or("a structure");
         let (order, word) = kind.split_at(kind.len().min(1));
-        let Some(known) = Kind::of(word).filter(|_| ["<", ">", "|", "="].contains(&order)) else {
+        let Some(known) = Kind::parse(word).filter(|_| ["<", ">", "|", "="].contains(&order)) else {
             let kind: String = kind.chars().filter(|c| !c.is_control()).take(20).collect();
             return Err(
                 format!("is an array of {kind}; save it as float32: array.astype(\"float32\")").into()
@@ -185,7 +185,7 @@ impl Header {
         })
     }
 
-    /// (width, height) and the number of channels of the image that it holds. Lengths of 1 in front, as of a batch of one, do not count.
+    /// (width, height) and the number of channels of the image. Leading lengths of 1, such as a batch of one, are dropped.
     fn image(&self) -> Result<((usize, usize), usize), ReadError> {
         let mut shape = &self.shape[..];
         while let [1, rest @ ..] = shape
@@ -250,7 +250,7 @@ fn only_array(bytes: &[u8], max_pixels: u64) -> Result<Vec<u8>, ReadError> {
     };
     let (method, crc, [packed, size], start) = fields().ok_or_else(cut)?;
     let body = || {
-        // Its own head may be longer than the list says.
+        // The local header may be longer than the entry in the list.
         let start = start + 30 + short(bytes, start + 26)? + short(bytes, start + 28)?;
         bytes.get(start..start.checked_add(packed)?)
     };
@@ -299,7 +299,7 @@ mod tests {
             let method = [if packs { 8 } else { 0 }, 0];
             let sizes = [sum.sum(), body.len() as u32, array.len() as u32].map(u32::to_le_bytes).concat();
             let name_length = (name.len() as u16).to_le_bytes();
-            // NumPy leaves room for large sizes in the head before the body alone.
+            // NumPy reserves room for large sizes only in the local header.
             out.extend(
                 [ARCHIVE, &[45, 0, 0, 0], &method, &[0; 4], &sizes, &name_length, &[20, 0], name.as_bytes()]
                     .concat(),
@@ -322,7 +322,7 @@ mod tests {
         super::super::raster::of_any!(raster.samples(), v => v.iter().map(|v| v.double()).collect())
     }
 
-    /// -1, 2, 3, 4, 5, 6 in two rows of three, or as near as a kind has them.
+    /// -1, 2, 3, 4, 5, 6 in two rows of three, as far as the type can represent them.
     #[test]
     fn numbers_of_all_kinds_are_read() {
         let values = [-1_i64, 2, 3, 4, 5, 6];
@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn shapes_are_those_of_images() {
+    fn shapes_of_images_are_read() {
         let data: Vec<u8> = (0..12).collect();
         let read = |by_columns, shape| {
             let raster = decode(&npy("|u1", by_columns, shape, &data), MANY).unwrap();
@@ -392,7 +392,7 @@ mod tests {
             for length in 0..whole.len() - 22 {
                 assert!(decode_archive(&whole[..length], MANY).is_err(), "{length}");
             }
-            // A byte of the array, behind the head of the archive.
+            // A byte of the array, after the header of the archive.
             let mut damaged = whole.clone();
             damaged[80] ^= 1;
             assert!(decode_archive(&damaged, MANY).is_err());

@@ -1,28 +1,28 @@
-//! How a stored image is turned: the tag Orientation of EXIF and TIFF.
+//! The orientation of a stored image: the tag Orientation of EXIF and TIFF.
 
 use image::metadata;
 
-/// How a stored image is turned, by the tag `Orientation` of EXIF and TIFF.
+/// The orientation of a stored image, from the tag `Orientation` of EXIF and TIFF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Orientation(u8);
 
 impl Orientation {
-    /// As it is seen.
+    /// Stored upright.
     pub const UPRIGHT: Self = Self(1);
 
-    /// The orientation of a tag, 1 to 8; upright for other numbers, which mean nothing.
+    /// The orientation of a tag, 1 to 8; other numbers, which are invalid, count as upright.
     #[must_use]
     pub fn of_tag(tag: u64) -> Self {
         if (1..=8).contains(&tag) { Self(tag as u8) } else { Self::UPRIGHT }
     }
 
-    /// That of the EXIF data of a file.
+    /// The orientation in the EXIF data of a file.
     pub(super) fn of_exif(data: &[u8]) -> Self {
         let known = metadata::Orientation::from_exif_chunk(data);
         known.map_or(Self::UPRIGHT, |known| Self::of_tag(known.to_exif().into()))
     }
 
-    /// Whether it is as it is seen.
+    /// Whether the image is stored upright.
     #[must_use]
     pub fn is_upright(self) -> bool {
         self == Self::UPRIGHT
@@ -33,7 +33,7 @@ impl Orientation {
         self.0 > 4
     }
 
-    /// Where the pixel (x, y) of the upright image is stored; the upright image has `size`.
+    /// The stored position of the pixel (x, y) of the upright image, which has `size`.
     pub(super) fn stored(self, (x, y): (usize, usize), (width, height): (usize, usize)) -> (usize, usize) {
         let (right, bottom) = (width - 1 - x, height - 1 - y);
         match self.0 {
@@ -54,9 +54,9 @@ mod tests {
     use super::*;
     use image::{DynamicImage, GrayImage};
 
-    /// The crate `image` turns the same way.
+    /// The crate `image` rotates in the same way.
     #[test]
-    fn pixels_go_where_others_put_them() {
+    fn pixels_move_as_in_another_library() {
         for tag in 0..=9_u8 {
             let (width, height) = (3, 2);
             let stored = GrayImage::from_fn(width, height, |x, y| image::Luma([(10 * y + x) as u8]));

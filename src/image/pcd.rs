@@ -2,8 +2,8 @@
 
 use super::cloud::{Cloud, encoded};
 
-/// A cloud as binary PCD 0.7 with the fields `x`, `y`, `z`, `rgb` and `intensity`, of four bytes each. `rgb` is 0x00RRGGBB in the
-/// bits of a float, as the Point Cloud Library has it; `intensity` is the confidence, 0 to 255.
+/// A cloud as binary PCD 0.7 with the fields `x`, `y`, `z`, `rgb` and `intensity`, of four bytes each. `rgb` is
+/// 0x00RRGGBB in the bits of a float, as in the Point Cloud Library; `intensity` is the confidence, 0 to 255.
 #[must_use]
 pub fn encode(cloud: &Cloud) -> Vec<u8> {
     let header = format!(

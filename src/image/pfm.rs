@@ -21,7 +21,7 @@ pub enum Pfm {
 /// ignored, as in the stereo benchmarks. Comments in the header are skipped.
 ///
 /// # Errors
-/// [`Error::Read`] when there is no such file, it is no complete PFM file, or it has more than
+/// [`Error::Read`] when there is no such file, it is not a complete PFM file, or it has more than
 /// [`MAX_PIXELS`].
 pub fn read(path: &Path) -> Result<Pfm> {
     let not_pfm = |bytes: &[u8]| (!is_pfm(bytes)).then(|| NOT_PFM.into());
@@ -54,7 +54,7 @@ pub(super) fn is_pfm(bytes: &[u8]) -> bool {
     matches!(bytes, [b'P', b'F' | b'f', c, ..] if c.is_ascii_whitespace() || *c == b'#')
 }
 
-/// Parses a whole file of at most `max_pixels` pixels; the error says what is wrong with it.
+/// Parses a whole file of at most `max_pixels` pixels; the error describes the fault.
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Pfm, ReadError> {
     if !is_pfm(bytes) {
         return Err(NOT_PFM.into());
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_comes_back_as_it_went() {
+    fn planes_survive_a_round_trip() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.pfm");
         write(&path, &plane()).unwrap();

@@ -1,4 +1,4 @@
-//! What PNG files show.
+//! Types that can be written as PNG files.
 
 use std::path::Path;
 
@@ -8,8 +8,8 @@ use image::{ExtendedColorType, ImageEncoder};
 use super::{Image, Plane};
 use crate::error::{Error, Result};
 
-/// What a PNG file shows: 8-bit or 16-bit grey levels, such as depths in millimetres, 8-bit colours (red, green, blue), or an
-/// image that the matcher sees.
+/// The contents of a PNG file: 8-bit or 16-bit grey levels, such as depths in millimetres, 8-bit colours
+/// (red, green, blue), or an image for the matcher.
 pub trait Picture {
     /// The bytes of the file, which errors call `path`.
     ///
@@ -30,8 +30,8 @@ macro_rules! planes {
 
 planes!(u8: L8, u16: L16, [u8; 3]: Rgb8);
 
-/// Reading the file gives the same pixels: it is grey where all colours are, with 8 bits where all levels have them, else with
-/// 16; with alpha where a pixel is masked.
+/// Reading the file gives the same pixels: it is grey if all colours are, with 8 bits if all levels have at
+/// most 8, else with 16, and with alpha if a pixel is masked.
 impl Picture for Image {
     fn png(&self, path: &Path) -> Result<Vec<u8>> {
         let pixels = self.pixels.data();
@@ -62,7 +62,7 @@ impl Picture for Image {
     }
 }
 
-/// A PNG file; 16-bit samples are in the byte order of the machine.
+/// Encodes a PNG file; 16-bit samples are in native byte order.
 pub(super) fn png(
     path: &Path,
     samples: &[u8],
@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn images_come_back_as_they_went() {
+    fn images_survive_a_round_trip() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         for (colours, masked, step) in [

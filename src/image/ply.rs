@@ -1,4 +1,4 @@
-//! Point clouds as PLY files, which `MeshLab`, `CloudCompare` and most others open.
+//! Point clouds as PLY files, which `MeshLab`, `CloudCompare` and most other programs open.
 
 use super::cloud::{Cloud, encoded};
 

@@ -1,4 +1,4 @@
-//! Images as they are stored, and their conversion to the levels that the matcher sees.
+//! Images as they are stored, and their conversion to the levels for the matcher.
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -46,17 +46,17 @@ pub struct Raster<'a> {
     pub(super) samples: Samples<'a>,
     /// `true` where a pixel holds no data, row by row; as large as the image.
     pub(super) no_data: Option<Vec<bool>>,
-    /// Where its file says that it lies.
+    /// The georeference of its file.
     pub(super) georeference: Option<Georeference>,
-    /// How its file says that it is turned.
+    /// The orientation tag of its file.
     pub(super) orientation: Orientation,
-    /// Why a part of it may be wrong, in words that go after the name of its file; once that is known, with this.
+    /// Why a part of it may be wrong, as the end of a sentence, with the name of its file once that is known.
     pub(super) doubt: Option<String>,
 }
 
 /// The sample types of a frame in memory: `u8`, `u16`, `f32` and `f64`.
 pub trait Sample: Copy + 'static {
-    /// The same number in double precision.
+    /// The number in double precision.
     fn double(self) -> f64;
 
     /// Samples of this type.
@@ -81,7 +81,7 @@ macro_rules! kinds {
 
 kinds!(u8: Byte, u16: Word, f32: Float, f64: Double);
 
-/// An expression for samples of any type.
+/// Evaluates an expression for samples of any type.
 macro_rules! of_any {
     ($samples:expr, $values:ident => $result:expr) => {
         match $samples {
@@ -96,11 +96,11 @@ pub(super) use of_any;
 
 impl<'a> Raster<'a> {
     /// Borrows a frame of `width` x `height` pixels with `channels` samples each. Rows begin `stride` samples
-    /// apart; where that is more than the length of a row, the rows are copied.
+    /// apart; if that is more than the length of a row, they are copied.
     ///
     /// # Errors
     /// [`Error::Mismatch`] when it has no pixel, a number of channels other than 1 to 4, or `data` is too
-    /// short for its rows; [`Error::Memory`] when the system has not enough memory for the copy.
+    /// short for its rows; [`Error::Memory`] when the system has too little memory for the copy.
     pub fn borrowed<S: Sample>(
         data: &'a [S],
         (width, height): (usize, usize),
@@ -142,16 +142,16 @@ impl<'a> Raster<'a> {
         Ok(Self::of((width, height), channels, samples))
     }
 
-    /// As [`Raster::new`], of samples that are known to fit.
+    /// Like [`Raster::new`], for samples that are known to fit.
     pub(super) fn of((width, height): (usize, usize), channels: usize, samples: Samples<'a>) -> Self {
         let orientation = Orientation::UPRIGHT;
         Self { width, height, channels, samples, no_data: None, georeference: None, orientation, doubt: None }
     }
 
-    /// Masks every pixel whose grey, or all of whose colour samples, are `value`, as it is stored.
+    /// Masks every pixel whose grey, or all of whose colour samples, have the stored `value`.
     ///
     /// # Errors
-    /// [`Error::Memory`] when the system has not enough memory.
+    /// [`Error::Memory`] when the system has too little memory.
     pub fn without(self, value: f64) -> Result<Self> {
         Ok(self.marked(value)?)
     }
@@ -161,14 +161,14 @@ impl<'a> Raster<'a> {
         Ok(self.ignoring(ignored))
     }
 
-    /// Masks the pixels where `ignored`, as large as the image, is `true`, beside those that are masked already.
+    /// Also masks the pixels where `ignored`, which is as large as the image, is `true`.
     fn ignoring(mut self, mut ignored: Vec<bool>) -> Self {
         add(&mut ignored, self.no_data.as_deref());
         self.no_data = Some(ignored);
         self
     }
 
-    /// Masks the pixels where `ignored` is `true`.
+    /// Also masks the pixels where `ignored` is `true`.
     ///
     /// # Errors
     /// [`Error::Mismatch`] when the sizes differ.
@@ -180,13 +180,13 @@ impl<'a> Raster<'a> {
         Ok(self.ignoring(ignored.into_data()))
     }
 
-    /// Why a part of the image may be wrong, with the name of its file: damage that its decoder makes up for.
+    /// The damage, with the name of its file, from which the decoder recovered.
     #[must_use]
     pub fn doubt(&self) -> Option<&str> {
         self.doubt.as_deref()
     }
 
-    /// The same with the name of its file.
+    /// Prepends the name of its file to the doubt.
     pub(super) fn named(self, file: &Path) -> Self {
         Self { doubt: self.doubt.map(|doubt| format!("{}: {doubt}", file.display())), ..self }
     }
@@ -197,7 +197,7 @@ impl<'a> Raster<'a> {
         (self.width, self.height)
     }
 
-    /// How many samples a pixel has: 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
+    /// Samples per pixel: 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
     #[must_use]
     pub fn channels(&self) -> usize {
         self.channels
@@ -209,17 +209,17 @@ impl<'a> Raster<'a> {
         &self.samples
     }
 
-    /// Where its pixels hold no data, row by row: as its file says, or as it was [told](Self::masked_by).
+    /// `true` for pixels without data, row by row: from its file, or from [`masked_by`](Self::masked_by).
     #[must_use]
     pub fn no_data(&self) -> Option<&[bool]> {
         self.no_data.as_deref()
     }
 
-    /// What is inside `part`, without a georeference.
+    /// The image inside `part`, without a georeference.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] when `part` is empty or not inside the image; [`Error::Memory`] when the system has not enough
-    /// memory.
+    /// [`Error::Mismatch`] when `part` is empty or not inside the image; [`Error::Memory`] when the system
+    /// has too little memory.
     pub fn crop(&self, part: &Rect) -> Result<Raster<'static>> {
         fn rows<S: Copy>(samples: &[S], of: usize, part: &Rect, each: usize) -> Result<Vec<S>> {
             let mut out = memory::reserved(part.x.len() * part.y.len() * each)?;
@@ -242,7 +242,7 @@ impl<'a> Raster<'a> {
         Ok(Raster { no_data, doubt, ..Raster::new(part.x.len(), part.y.len(), n, samples)? })
     }
 
-    /// The image as it is seen, where its file says that it is stored turned; then without its georeference.
+    /// The image rotated upright by its orientation tag; if that changes it, without its georeference.
     pub(super) fn upright(self) -> Result<Self, MemoryError> {
         fn turned<S: Copy>(
             values: &[S],
@@ -268,7 +268,7 @@ impl<'a> Raster<'a> {
         Ok(Self { no_data, doubt: self.doubt, ..Self::of(size, n, samples) })
     }
 
-    /// `f` applied to the grey or colour samples of each pixel.
+    /// Applies `f` to the grey or colour samples of each pixel.
     pub(super) fn plane<S, T>(&self, samples: &[S], f: impl Fn(&[S]) -> T) -> Plane<T> {
         let colours = self.colours();
         let values = samples.chunks_exact(self.channels).map(|pixel| f(&pixel[..colours])).collect();
@@ -290,12 +290,12 @@ impl<'a> Raster<'a> {
         plane
     }
 
-    /// Samples of grey or of a colour.
+    /// Number of grey or colour samples.
     fn colours(&self) -> usize {
         if self.channels < 3 { 1 } else { 3 }
     }
 
-    /// The grey or colour samples, all `values`, of every unmasked pixel.
+    /// Those of `values` that are grey or colour samples of unmasked pixels.
     fn unmasked<'b, S>(&self, values: &'b [S], masked: &'b Plane<bool>) -> impl Iterator<Item = &'b S> {
         let colours = self.colours();
         let pixels = values.chunks_exact(self.channels).zip(masked.data()).filter(|(_, masked)| !**masked);
@@ -303,12 +303,12 @@ impl<'a> Raster<'a> {
     }
 }
 
-/// Masks what another mask of the same size does, where there is one.
+/// Adds another mask of the same size, if there is one.
 fn add(masked: &mut [bool], other: Option<&[bool]>) {
     masked.iter_mut().zip(other.into_iter().flatten()).for_each(|(masked, other)| *masked |= other);
 }
 
-/// Whether the first `colours` of the `n` samples of a pixel are all `value`, rounded to their type. NaN
+/// Whether the first `colours` of the `n` samples of each pixel are all `value`, rounded to their type. NaN
 /// counts as equal to NaN.
 #[allow(clippy::float_cmp, reason = "it is that very value that stands for no data")]
 pub(super) fn holding(
@@ -318,7 +318,7 @@ pub(super) fn holding(
     value: f64,
 ) -> Result<Vec<bool>, MemoryError> {
     let mut out = memory::reserved(samples.len() / n)?;
-    // The value may have been written with fewer digits; it then stands for the nearest float.
+    // A value written with fewer digits stands for the nearest float.
     let value = if matches!(samples, Samples::Float(_)) { f64::from(value as f32) } else { value };
     let holds = |v: f64| v == value || v.is_nan() && value.is_nan();
     of_any!(samples, v => {
@@ -327,41 +327,42 @@ pub(super) fn holding(
     Ok(out)
 }
 
-/// An 8-bit level on the 16-bit scale.
+/// An 8-bit level stretched to the 16-bit scale.
 pub(in crate::image) fn stretched(v: u8) -> u16 {
     v as u16 * 257
 }
 
 impl Pair {
-    /// The pair of two images in memory, with their values scaled alike. [`Reader::pair`] gives the rules.
+    /// A pair of two images in memory, scaled alike by the rules of [`Reader::pair`].
     ///
     /// # Errors
-    /// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values; [`Error::Memory`] when the
-    /// system has not enough memory.
+    /// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values;
+    /// [`Error::Memory`] when the system has too little memory.
     ///
     /// [`Reader::pair`]: super::read::Reader::pair
     pub fn of_frames(left: Raster, right: Raster) -> Result<Self> {
         joined([left, right], ["the left image", "the right one"], Sizes::Equal)
     }
 
-    /// A pair of two raw images, which may differ in size: the pair has the larger one, and the smaller image is masked
-    /// outside of itself. A [`Rectification`](crate::rectification::Rectification) makes views of one size of them.
+    /// A pair of two raw images, which may differ in size: the pair has the larger one, and the smaller image
+    /// is extended with masked pixels. A [`Rectification`](crate::rectification::Rectification) makes views
+    /// of one size from them.
     ///
     /// # Errors
-    /// Those of [`Pair::of_frames`], but for the sizes.
+    /// The errors of [`Pair::of_frames`], except about sizes.
     pub fn of_raw_frames(left: Raster, right: Raster) -> Result<Self> {
         joined([left, right], ["the left image", "the right one"], Sizes::Any)
     }
 }
 
-/// Which sizes the images of a pair may have.
+/// The sizes that the images of a pair may have.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Sizes {
     Equal,
     Any,
 }
 
-/// As [`Pair::of_frames`], of images that errors call by these names.
+/// Like [`Pair::of_frames`], for images that errors call by these names.
 pub(super) fn joined(
     [left, right]: [Raster; 2],
     [of_left, of_right]: [impl Display; 2],
@@ -381,7 +382,7 @@ pub(super) fn joined(
             "{float} holds float values and {whole} whole ones: give both in one format"
         )));
     }
-    // The pixels and the mask of both views.
+    // Pixels and masks of both views.
     let size = (width.max(w), height.max(h));
     let pixels = size.0 as u64 * size.1 as u64;
     memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, Purpose::Image)?;
@@ -409,14 +410,14 @@ pub(super) fn joined(
 enum Scale {
     /// 8-bit levels, stored as they are or times 257.
     Level,
-    /// Words with this many free bits at the top; 8-bit levels beside them fill the same range.
+    /// Words with this many free bits at the top; 8-bit levels of the other view fill the same range.
     Shift(u32),
     /// Floats between these bounds.
     Linear { min: f64, max: f64 },
 }
 
 impl Scale {
-    /// The scale that the unmasked samples need.
+    /// The scale for the unmasked samples.
     fn of(images: [&Raster; 2], masks: &[Plane<bool>; 2]) -> Self {
         let each = || images.into_iter().zip(masks);
         if images[0].samples.is_float() {
@@ -429,7 +430,7 @@ impl Scale {
             });
             return Self::Linear { min, max };
         }
-        // Bytes fill their range by themselves: beside words of 12 bits, only these need more.
+        // Bytes always fill their range; words of 12 bits, say, must be shifted to match.
         let (mut bits, mut levels) = (0, true);
         each().for_each(|(image, masked)| {
             if let Samples::Word(v) = &image.samples {
@@ -455,7 +456,7 @@ impl Scale {
 
     fn byte(self, v: u8) -> u16 {
         match self {
-            // Words that are no larger than bytes are levels as these are.
+            // Words no larger than bytes count as levels too.
             Self::Shift(free) if free < 8 => stretched(v),
             _ => u16::from(v) << 8,
         }
@@ -470,7 +471,7 @@ impl Scale {
 
     fn double(self, v: f64) -> u16 {
         match self {
-            // Halves are used, because the difference of two doubles may overflow.
+            // Halves, because the difference of two doubles may overflow.
             Self::Linear { min, max } if max > min => {
                 ((v / 2.0 - min / 2.0) / (max / 2.0 - min / 2.0) * LINEAR_TOP).round() as u16
             }

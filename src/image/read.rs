@@ -1,4 +1,4 @@
-//! Reading pairs, masks and disparity maps.
+//! Reads pairs, masks and disparity maps.
 //!
 //! The kind of a file is detected from its first bytes, never from its name.
 
@@ -18,7 +18,7 @@ pub use super::file::MAX_PIXELS;
 /// Disparities in PNG files with 16 bits are in 1/256 of a pixel, as in the KITTI benchmark.
 const KITTI_SCALE: f32 = 256.0;
 
-/// The settings for reading files. The functions of this module use the default.
+/// Settings for reading files. The functions of this module use the default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reader {
     /// Largest number of pixels of an image. A file whose header claims more is rejected before memory is
@@ -29,20 +29,20 @@ pub struct Reader {
     /// it: 0 to 255 for 8 bits, an index into the palette in TIFF. A pixel is masked where all of its samples
     /// have this value. `None`: the value that a TIFF file declares itself.
     pub no_data: Option<f64>,
-    /// Whether images and masks are turned upright that are stored turned, as the tag `Orientation` of EXIF or TIFF says. Those that
-    /// are turned have no georeference.
+    /// Whether to rotate images and masks upright by the tag `Orientation` of EXIF or TIFF. Rotated images
+    /// have no georeference.
     pub orient: bool,
 }
 
 impl Default for Reader {
-    /// [`MAX_PIXELS`], the no-data value that a file declares itself, and pixels as they are stored.
+    /// [`MAX_PIXELS`], the no-data value that a file declares, and pixels as stored.
     fn default() -> Self {
         Self { max_pixels: MAX_PIXELS, no_data: None, orient: false }
     }
 }
 
 impl Reader {
-    /// Reads a rectified pair from PNG, JPEG, PNM, TIFF, BMP or PFM files or arrays of NumPy, told apart by their content.
+    /// Reads a rectified pair from PNG, JPEG, PNM, TIFF, BMP or PFM files or NumPy arrays, detected by their content.
     ///
     /// Values become 1/256 of an 8-bit level:
     ///
@@ -77,7 +77,7 @@ impl Reader {
     /// Reads a pair of raw images, which may differ in size: see [`Pair::of_raw_frames`].
     ///
     /// # Errors
-    /// Those of [`Reader::pair`], but for the sizes.
+    /// The errors of [`Reader::pair`], except about sizes.
     pub fn raw_pair(self, left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
         self.pair_of(left, right, mask, Sizes::Any)
     }
@@ -88,11 +88,11 @@ impl Reader {
         raster::joined([first, second], [left, right].map(Path::display), sizes)
     }
 
-    /// Like [`Reader::pair`], from a file with both views: MPO with its two images, or JPS with the right view on the left half unless it
-    /// says otherwise. Returns, too, whether the file says which view is the left one.
+    /// Like [`Reader::pair`], from a file with both views: MPO with two images, or JPS with the right view on
+    /// the left half unless it says otherwise. Also returns whether the file says which view is the left one.
     ///
     /// # Errors
-    /// Those of [`Reader::pair`], and where it holds one view alone.
+    /// The errors of [`Reader::pair`], and when the file holds only one view.
     pub fn both(self, file: &Path, mask: Option<&Path>) -> Result<(Pair, bool)> {
         let bytes = load(file, self.max_pixels)?;
         let views = both::decode_both(file, &bytes, self.max_pixels, self.no_data, self.orient);
@@ -102,7 +102,7 @@ impl Reader {
         Ok((pair, is_ordered))
     }
 
-    /// A left image without what the file `mask` masks.
+    /// Applies the mask in the file `mask` to a left image.
     fn masked(self, image: Raster<'static>, mask: Option<&Path>, file: &Path) -> Result<Raster<'static>> {
         let Some(path) = mask else { return Ok(image) };
         let ignored = self.mask(path)?;
@@ -116,15 +116,15 @@ impl Reader {
         })
     }
 
-    /// Reads one image, as it is stored or upright: one view, or both beside each other. [`Pair::of_frames`] makes a pair of two.
+    /// Reads one image, as stored or upright: a single view, or two side by side. [`Pair::of_frames`] makes a pair of two.
     ///
     /// # Errors
-    /// [`Error::Read`], as [`Reader::pair`].
+    /// [`Error::Read`], like [`Reader::pair`].
     pub fn raster(self, path: &Path) -> Result<Raster<'static>> {
         self.oriented(self.with_kind(path)?.1, path)
     }
 
-    /// Upright where the images are to be.
+    /// The image rotated upright, if the reader is to do that.
     fn oriented<'a>(self, raster: Raster<'a>, path: &Path) -> Result<Raster<'a>> {
         if !self.orient {
             return Ok(raster);
@@ -132,24 +132,24 @@ impl Reader {
         raster.upright().map_err(|cause| Error::read(path, cause))
     }
 
-    /// As [`Reader::raster`], of masks and levels, where no value stands for no data.
+    /// Like [`Reader::raster`], for masks and levels, in which no value means no data.
     fn whole(self, path: &Path) -> Result<Raster<'static>> {
         Self { no_data: None, ..self }.raster(path)
     }
 
-    /// As [`Reader::pair`], from files that are in memory, each with the name by which errors call it.
+    /// Like [`Reader::pair`], from files in memory, each with its name for errors.
     ///
     /// # Errors
-    /// Those of [`Reader::pair`].
+    /// The errors of [`Reader::pair`].
     pub fn pair_in_memory(self, left: (&Path, &[u8]), right: (&Path, &[u8])) -> Result<Pair> {
         let image = |(name, bytes): (&Path, &[u8])| self.raster_in_memory(name, bytes);
         raster::joined([image(left)?, image(right)?], [left.0, right.0].map(Path::display), Sizes::Equal)
     }
 
-    /// As [`Reader::raster`], from a file that is in memory, with the name by which errors call it.
+    /// Like [`Reader::raster`], from a file in memory, with its name for errors.
     ///
     /// # Errors
-    /// Those of [`Reader::raster`].
+    /// The errors of [`Reader::raster`].
     pub fn raster_in_memory(self, name: &Path, bytes: &[u8]) -> Result<Raster<'static>> {
         let raster =
             decode(bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(name, cause))?;
@@ -159,23 +159,23 @@ impl Reader {
     fn with_kind(self, path: &Path) -> Result<(Option<Kind>, Raster<'static>)> {
         let bytes = load(path, self.max_pixels)?;
         let raster = decode(&bytes, self.max_pixels, self.no_data);
-        Ok((Kind::of(&bytes), raster.map_err(|cause| Error::read(path, cause))?.named(path)))
+        Ok((Kind::detect(&bytes), raster.map_err(|cause| Error::read(path, cause))?.named(path)))
     }
 
     /// Reads a mask from any image that [`Reader::pair`] reads: `true` where a pixel is not black (alpha does not count).
     ///
     /// # Errors
-    /// [`Error::Read`] as [`Reader::pair`].
+    /// [`Error::Read`], like [`Reader::pair`].
     pub fn mask(self, path: &Path) -> Result<Plane<bool>> {
         let raster = self.whole(path)?;
         Ok(of_any!(&raster.samples, v => raster.plane(v, |c| c.iter().any(|&v| v.double() != 0.0))))
     }
 
     /// Reads 8-bit levels, such as those of Middlebury's visibility masks, from any integer image that
-    /// [`Reader::pair`] reads: of 16 bits the upper 8, of colours the grey.
+    /// [`Reader::pair`] reads: the upper 8 of 16 bits, and the grey of colours.
     ///
     /// # Errors
-    /// [`Error::Read`] as [`Reader::pair`], and for float values.
+    /// [`Error::Read`], like [`Reader::pair`], and for float values.
     pub fn grey8(self, path: &Path) -> Result<Plane<u8>> {
         let raster = self.whole(path)?;
         let shift = match &raster.samples {
@@ -192,19 +192,19 @@ impl Reader {
         })))
     }
 
-    /// Reads a disparity map in pixels; invalid pixels become +infinity. PFM, float TIFF, and floats of NumPy hold disparities
-    /// as they are (not finite = invalid), 16-bit PNG holds them times 256 (0 = invalid).
+    /// Reads a disparity map in pixels; invalid pixels become +infinity. PFM, float TIFF and NumPy floats
+    /// hold disparities directly (not finite = invalid), 16-bit PNG holds them times 256 (0 = invalid).
     ///
-    /// # Errors
+    /// [`Error::Read`] when the file is missing, damaged, or holds no disparities in one of these forms.
     /// [`Error::Read`] when the file is missing, damaged, or holds no disparities in one of these ways.
     pub fn disparity(self, path: &Path) -> Result<Plane<f32>> {
         self.map(path, None)
     }
 
-    /// Reads whole numbers, of a PNG, TIFF or array of NumPy with 8 or 16 bits, that are disparities times `scale`, as in the ground truth of
-    /// the older Middlebury sets; 0 means unknown and becomes +infinity.
+    /// Reads disparities times `scale`, stored as whole numbers in a PNG, TIFF or NumPy array with 8 or 16
+    /// bits, as in the ground truth of the older Middlebury sets; 0 means unknown and becomes +infinity.
     ///
-    /// # Errors
+    /// [`Error::Read`] when the file is missing, damaged, or does not hold such numbers.
     /// [`Error::Read`] when the file is missing, damaged, or holds no such numbers.
     pub fn scaled_disparity(self, path: &Path, scale: f32) -> Result<Plane<f32>> {
         self.map(path, Some(scale))
@@ -251,10 +251,10 @@ impl Reader {
 }
 
 impl Pair {
-    /// Reads a rectified pair from two files, as [`Reader::pair`] does.
+    /// Reads a rectified pair from two files, like [`Reader::pair`].
     ///
     /// # Errors
-    /// Those of [`Reader::pair`].
+    /// The errors of [`Reader::pair`].
     pub fn open(left: impl AsRef<Path>, right: impl AsRef<Path>) -> Result<Self> {
         Reader::default().pair(left.as_ref(), right.as_ref(), None)
     }
@@ -263,7 +263,7 @@ impl Pair {
 /// [`Reader::grey8`] with the default settings.
 ///
 /// # Errors
-/// Those of [`Reader::grey8`].
+/// The errors of [`Reader::grey8`].
 pub fn grey8(path: &Path) -> Result<Plane<u8>> {
     Reader::default().grey8(path)
 }
@@ -271,7 +271,7 @@ pub fn grey8(path: &Path) -> Result<Plane<u8>> {
 /// [`Reader::disparity`] with the default settings.
 ///
 /// # Errors
-/// Those of [`Reader::disparity`].
+/// The errors of [`Reader::disparity`].
 pub fn read_disparity(path: &Path) -> Result<Plane<f32>> {
     Reader::default().disparity(path)
 }

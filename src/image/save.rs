@@ -1,5 +1,5 @@
-//! Files that are written completely or not at all. A symbolic link stays a link: its target is written,
-//! whether it exists or not.
+//! Writes files completely or not at all. A symbolic link is kept, and its target is written, whether it
+//! exists or not.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
@@ -9,11 +9,11 @@ use tempfile::NamedTempFile;
 
 use crate::error::{Error, Reason, Result};
 
-/// Largest number of links that are followed.
+/// Most symbolic links that are followed.
 const MAX_LINKS: usize = 40;
 
-/// Where a file at `path` will be once it is complete, replacing what is there, and its folder. `None` for anything else that
-/// exists: a device or a pipe must not be replaced by a file.
+/// The final path of a file to be written at `path`, which is replaced if it exists, and its folder. `None`
+/// for any other existing path: a device or a pipe must not be replaced by a file.
 fn destination(path: &Path) -> Result<Option<(PathBuf, PathBuf)>> {
     let error = |reason: Reason| Err(Error::write(path, reason));
     let there = fs::metadata(path);
@@ -30,7 +30,7 @@ fn destination(path: &Path) -> Result<Option<(PathBuf, PathBuf)>> {
     }
     let file = match there {
         Err(e) if e.kind() == ErrorKind::NotADirectory => return error(no_folder(folder_of(path))),
-        // Such as a name that is too long: it would be found out when all is done.
+        // An invalid name, for example too long, would otherwise be noticed only at the end.
         Err(e) if e.kind() != ErrorKind::NotFound => followed(path).and(Err(e)),
         _ => followed(path),
     };
@@ -42,7 +42,7 @@ fn destination(path: &Path) -> Result<Option<(PathBuf, PathBuf)>> {
     Ok(Some((file, folder)))
 }
 
-/// Why nothing can be written into `folder`, which is none.
+/// Why nothing can be written into `folder`, which is not a folder.
 #[must_use]
 pub fn no_folder(folder: &Path) -> Reason {
     match folder.ancestors().find(|part| part.exists() && !part.is_dir()) {
@@ -73,14 +73,14 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("its links lead in a circle"))
 }
 
-/// Where the bytes of a file go until it is complete.
+/// The destination of the bytes of a file until it is complete.
 enum Sink {
-    /// To a device or a pipe, at once.
+    /// A device or a pipe, written directly.
     Special(File),
-    /// To a file without a name: it disappears no matter how the program ends.
+    /// A file without a name, which disappears however the program ends.
     #[cfg(target_os = "linux")]
     Unnamed(File),
-    /// To a file that is deleted when dropped.
+    /// A file that is deleted when dropped.
     Named(NamedTempFile),
 }
 
@@ -99,7 +99,7 @@ impl Sink {
         })
     }
 
-    /// The bare file: with its name, errors would mention the temporary name.
+    /// The bare file: errors of the named one would mention its temporary name.
     fn file(&mut self) -> &mut File {
         match self {
             Self::Special(file) => file,
@@ -109,7 +109,7 @@ impl Sink {
         }
     }
 
-    /// Gives it its name, replacing an existing file.
+    /// Gives the file its name, replacing an existing file.
     fn persist(mut self, name: &Path) -> io::Result<()> {
         if !matches!(self, Self::Special(_)) {
             // Otherwise a crash of the machine could leave the name without the contents.
@@ -136,14 +136,14 @@ fn builder() -> tempfile::Builder<'static, 'static> {
     builder.prefix(".mrfgs-").suffix(".tmp");
     #[cfg(unix)]
     {
-        // Temporary files are private by default; an output is as readable as the umask allows.
+        // Temporary files are private by default; an output should be as readable as the umask allows.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder
 }
 
-/// A file without a name in `folder`, where the file system supports such files and can name them later.
+/// A file without a name in `folder`, if the file system supports that and can name it later.
 #[cfg(target_os = "linux")]
 fn unnamed(folder: &Path) -> io::Result<File> {
     use rustix::fs::{Mode, OFlags};
@@ -153,26 +153,26 @@ fn unnamed(folder: &Path) -> io::Result<File> {
     fs::symlink_metadata(place(&file)).map(|_| file)
 }
 
-/// The path under which the system shows an open file.
+/// The path of an open file in /proc.
 #[cfg(target_os = "linux")]
 fn place(file: &File) -> PathBuf {
     use std::os::fd::AsRawFd;
     PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()))
 }
 
-/// Gives a file without a name the name `name`, which must be free.
+/// Names an unnamed file; `name` must be free.
 #[cfg(target_os = "linux")]
 fn link(file: &File, name: &Path) -> io::Result<()> {
     use rustix::fs::{AtFlags, CWD, linkat};
     Ok(linkat(CWD, place(file), CWD, name, AtFlags::SYMLINK_FOLLOW)?)
 }
 
-/// A file that is written piece by piece. It appears when it is [finished](Self::finish), and until then what was there before
-/// stays; dropped before, it leaves nothing. An existing path that is not a regular file is written to directly; a symbolic
+/// A file that is written piece by piece. It appears only when it is [finished](Self::finish), and leaves
+/// nothing if dropped before. An existing path that is not a regular file is written to directly; a symbolic
 /// link is followed.
 pub struct Growing {
     path: PathBuf,
-    /// What it will be called, where links have been followed.
+    /// The final name, after following links.
     name: PathBuf,
     to: Sink,
 }
@@ -192,7 +192,7 @@ impl Growing {
         Ok(Self { path: path.to_owned(), name, to })
     }
 
-    /// Ends the file, and gives it its name.
+    /// Completes the file, and gives it its name.
     ///
     /// # Errors
     /// [`Error::Write`] when it cannot be written.
@@ -211,7 +211,7 @@ impl Write for Growing {
     }
 }
 
-/// Writes a file completely or not at all, as [`Growing`] does.
+/// Writes a file completely or not at all, like [`Growing`].
 ///
 /// # Errors
 /// [`Error::Write`] when the file cannot be written.
@@ -221,7 +221,7 @@ pub fn save(path: &Path, bytes: &[u8]) -> Result<()> {
     file.finish()
 }
 
-/// Moves the file `staged` to `path`, replacing what is there; a symbolic link is followed.
+/// Moves the file `staged` to `path`, which is replaced if it exists; a symbolic link is followed.
 ///
 /// # Errors
 /// [`Error::Write`] for `path` when it cannot be moved.
@@ -263,7 +263,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::create_dir(at("below")).unwrap();
-        // Links to a file, to nothing yet, through another link, and as an absolute path.
+        // Links to a file, to a missing file, through another link, and as an absolute path.
         fs::write(at("below/there"), "old").unwrap();
         for (link, to) in [("a", "below/there"), ("b", "below/new"), ("c", "a")] {
             symlink(to, at(link)).unwrap();
@@ -283,7 +283,7 @@ mod tests {
         remove(&at("c")).unwrap();
         assert!(!at("below/there").exists() && fs::symlink_metadata(at("a")).unwrap().is_symlink());
         remove(&at("c")).unwrap();
-        // Into no folder, and in a circle.
+        // A link into a missing folder, and a circular one.
         symlink("none/file", at("e")).unwrap();
         symlink("f", at("f")).unwrap();
         for (link, word) in [("e", "there is no folder"), ("f", "circle")] {
@@ -294,19 +294,19 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_file_in_the_making_has_no_name() {
+    fn an_unfinished_file_has_no_name() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         let mut made = Growing::new(&path).unwrap();
         made.write_all(b"half").unwrap();
         let Sink::Unnamed(_) = made.to else {
-            // Some file systems have none; then it has one.
+            // Some file systems do not support unnamed files.
             assert_eq!(count(folder.path()), 1);
             return;
         };
         assert_eq!(count(folder.path()), 0);
         made.finish().unwrap();
-        // Over one that is there.
+        // Replaces an existing file.
         save(&path, b"whole").unwrap();
         assert_eq!((fs::read_to_string(&path).unwrap().as_str(), count(folder.path())), ("whole", 1));
     }

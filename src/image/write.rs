@@ -1,4 +1,4 @@
-//! Writing maps and pictures: a file is written completely or not at all.
+//! Writes maps and pictures: a file is written completely or not at all.
 
 use std::fs;
 use std::path::Path;
@@ -16,7 +16,7 @@ pub use super::save::{Growing, no_folder, publish, remove, save};
 /// Disparities in 16-bit PNG files are in 1/256 of a pixel, as in the KITTI benchmark.
 const PNG_SCALE: f32 = 256.0;
 
-/// The extensions of clouds.
+/// The extensions of point clouds.
 const CLOUDS: &str = if cfg!(feature = "las") { ".ply, .pcd, .las or .laz" } else { ".ply or .pcd" };
 
 /// The format of a disparity map.
@@ -27,11 +27,11 @@ enum Format {
     Tiff,
 }
 
-/// How maps are written. [`Plane::save`] uses the default.
+/// Settings for writing maps. [`Plane::save`] uses the default.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Writer {
-    /// Where the pixels of a map lie on the ground: those of [`Pair::georeferences`](super::Pair::georeferences). TIFF alone
-    /// holds it.
+    /// The georeference of the map: that of [`Pair::georeferences`](super::Pair::georeferences). Only TIFF
+    /// can hold it.
     pub georeference: Option<Georeference>,
 }
 
@@ -44,8 +44,8 @@ impl Writer {
     /// - `.png`: 16 bits, disparity times 256; invalid is 0, as in the KITTI benchmark. Only disparities from 0
     ///   to below 256; a valid one that would round to 0 becomes 1.
     ///
-    /// An existing path that is not a regular file (`/dev/null`, a pipe) is written to directly, as PFM when its
-    /// name has no known extension.
+    /// An existing path that is not a regular file (`/dev/null`, a pipe) is written to directly, as PFM if
+    /// its name has no known extension.
     ///
     /// # Errors
     /// [`Error::Write`] for an unknown extension, a disparity that PNG cannot hold, or a file that cannot be
@@ -74,8 +74,8 @@ impl Writer {
         }
     }
 
-    /// Writes a depth map (not finite = invalid) as [`Writer::disparity`] writes disparities, but not as PNG, which has
-    /// no unit.
+    /// Writes a depth map (not finite = invalid) like [`Writer::disparity`], except as PNG, which has no
+    /// unit.
     ///
     /// # Errors
     /// [`Error::Write`] for an extension other than `.pfm`, `.tif` and `.tiff`, or a file that cannot be written.
@@ -86,10 +86,10 @@ impl Writer {
 }
 
 impl Plane<f32> {
-    /// Writes this disparity map, as [`Writer::disparity`] does with the default settings.
+    /// Writes this disparity map, like [`Writer::disparity`] with the default settings.
     ///
     /// # Errors
-    /// Those of [`Writer::disparity`].
+    /// The errors of [`Writer::disparity`].
     pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
         Writer::default().disparity(path.as_ref(), self)
     }
@@ -139,9 +139,9 @@ pub fn check_path(path: &Path) -> Result<()> {
     check(path)
 }
 
-/// Writes a cloud of points in the format of the extension: `.ply` as [`ply::encode`] has it, `.pcd` as [`pcd::encode`] has it; with
-/// the feature `las` also LAS 1.2 as `.las` and `.laz`, whose intensity is 257 times the confidence. An existing path that is not a
-/// regular file takes PLY when its name has no such extension.
+/// Writes a point cloud in the format of the extension: `.ply` ([`ply::encode`]) or `.pcd` ([`pcd::encode`]);
+/// with the feature `las` also LAS 1.2 as `.las` and `.laz`, whose intensity is 257 times the confidence. An
+/// existing path that is not a regular file gets PLY if its name has no such extension.
 ///
 /// # Errors
 /// [`Error::Write`] for another extension, points that the format cannot hold, or a file that cannot be written.
@@ -202,7 +202,7 @@ fn extension(path: &Path) -> Option<String> {
     Some(path.extension()?.to_str()?.to_ascii_lowercase())
 }
 
-/// Whether there is something at `path` that is neither a file nor a folder.
+/// Whether `path` exists and is neither a file nor a folder.
 fn is_special(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
@@ -239,10 +239,10 @@ mod tests {
     }
 
     #[test]
-    fn maps_come_back_as_they_went() {
+    fn maps_survive_a_round_trip() {
         let folder = tempfile::tempdir().unwrap();
         let map = Plane::new(3, 2, vec![0.5, 255.0, f32::INFINITY, 17.25, 1.0 / 256.0, 3.0]);
-        // What PNG cannot hold.
+        // Values that PNG cannot hold.
         let wild = Plane::new(2, 2, vec![-3.5, 256.0, 1e6, f32::INFINITY]);
         for (name, map) in [
             ("a.pfm", &map),
@@ -266,13 +266,13 @@ mod tests {
     }
 
     #[test]
-    fn the_name_of_a_cloud_says_its_format() {
+    fn the_extension_of_a_cloud_decides_its_format() {
         let folder = tempfile::tempdir().unwrap();
         for refused in ["a.xyz", "a"] {
             let error = cloud(&folder.path().join(refused), &Cloud::default()).unwrap_err().to_string();
             assert!(error.contains(refused) && error.contains(CLOUDS), "{error}");
         }
-        // No point is a cloud, too.
+        // An empty cloud is valid.
         for (name, end) in [("a.PLY", &b"end_header\n"[..]), ("a.pcd", b"DATA binary\n")] {
             let path = folder.path().join(name);
             cloud(&path, &Cloud::default()).unwrap();
@@ -282,10 +282,10 @@ mod tests {
     }
 
     #[test]
-    fn invalid_pixels_carry_the_mark_of_each_format() {
+    fn invalid_pixels_have_the_marker_of_each_format() {
         let map = Plane::new(4, 1, vec![f32::INFINITY, f32::NAN, f32::NEG_INFINITY, 1.0]);
         assert_eq!(png_levels(&map).unwrap(), [0, 0, 0, 256]);
-        // No disparity is not invalid.
+        // A disparity of 0 is valid.
         assert_eq!(png_levels(&Plane::new(4, 1, vec![0.0, -0.0, 0.001, 255.99])).unwrap(), [1, 1, 1, 65533]);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.pfm");
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_come_back_as_they_went() {
+    fn pictures_survive_a_round_trip() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         picture(&path, &Plane::new(2, 1, vec![3_u8, 200])).unwrap();
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn the_early_check_finds_what_would_fail() {
+    fn the_early_check_finds_later_failures() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         let check = |name: &str, min, max| check_disparity_path(&at(name), min, max);
@@ -356,7 +356,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn outputs_are_as_open_as_other_files_and_links_stay() {
+    fn outputs_have_the_usual_permissions_and_links_stay() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);

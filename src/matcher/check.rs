@@ -1,4 +1,4 @@
-//! A device is seen to be right before it is trusted.
+//! Checks a device before it is used.
 
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
@@ -12,8 +12,8 @@ use crate::program::Program;
 use crate::program::tiles::Tiles;
 use std::ops::ControlFlow;
 
-/// Sees that a device computes a small pair by `method` as the CPU path does, before it matches a large one: a driver that gets
-/// arithmetic, loops or memory wrong says nothing. `checked` is the last method that passed.
+/// Checks that a device computes the same maps as the CPU path on a small pair, because drivers do not report
+/// errors in arithmetic, loops or memory. `checked` is the last method that passed.
 pub(super) async fn check(gpu: &mut Gpu, method: &Method, checked: &mut Option<Method>) -> Result<()> {
     if checked.as_ref() == Some(method) {
         return Ok(());
@@ -23,7 +23,7 @@ pub(super) async fn check(gpu: &mut Gpu, method: &Method, checked: &mut Option<M
         let hash = (x as u32 * 73 + y as u32 * 179 + 1).wrapping_mul(0x9e37_79b9);
         [hash >> 24, hash >> 16 & 0xff, hash >> 8 & 0xff].map(|v| v as u8)
     };
-    // Two surfaces, the nearer below.
+    // Two surfaces, the nearer one below.
     let step = |y: usize| if y < height / 2 { 3 } else { 8 };
     let left = Image::from_rgb8(&Plane::from_fn(width, height, texture));
     let right = Image::from_rgb8(&Plane::from_fn(width, height, |x, y| texture(x + step(y), y)));

@@ -1,4 +1,4 @@
-//! One match, with everything that one may want of it.
+//! A single match with all its options.
 
 use super::search::Search;
 use super::{Matched, Matcher};
@@ -13,7 +13,7 @@ use crate::watch::Progress;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What a listener to progress may answer: nothing, or whether to go on.
+/// The return value of a progress listener: nothing, or whether to go on.
 pub trait Answer {
     /// Whether the match goes on.
     fn goes_on(self) -> bool;
@@ -35,7 +35,7 @@ type Listener<'a> = Box<dyn FnMut(Progress) -> bool + Send + 'a>;
 type Find<'a> = Box<dyn FnOnce(&Pair) -> Result<DisparityRange> + Send + 'a>;
 type Inspect<'a> = Box<dyn FnMut(&mut Inspection) -> Result<()> + Send + 'a>;
 
-/// A match that has not begun: [`Matcher::job`] makes one, [`Job::run`] does it.
+/// A match that has not started: [`Matcher::job`] makes one, [`Job::run`] runs it.
 #[must_use = "a job does nothing until it is run"]
 pub struct Job<'a> {
     matcher: &'a mut Matcher,
@@ -54,7 +54,7 @@ impl Matcher {
     /// Matches `pair` over the disparities of `search`: `0..=47`, or `..` for the range that sparse matches find.
     ///
     /// # Errors
-    /// Those of [`Job::run`].
+    /// The errors of [`Job::run`].
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run(&mut self, pair: &Pair, search: impl Search) -> Result<Matched> {
         self.job(pair, search).run()
@@ -73,7 +73,7 @@ impl<'a> Job<'a> {
             matcher,
             pair,
             find,
-            found: S::FOUND,
+            found: S::AUTOMATIC,
             method: None,
             region: None,
             cancel: None,
@@ -82,29 +82,29 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// By `method` instead of the matcher's own.
+    /// Uses `method` instead of the matcher's own.
     pub fn method(self, method: &'a Method) -> Self {
         Self { method: Some(method), ..self }
     }
 
-    /// Matches this part of the left view alone, with what the right view has of it, in the time of that part; the maps have its
-    /// size. See [`Region`].
+    /// Matches only this part of the left view, with its counterpart in the right view, in the time of that
+    /// part; the maps have its size. See [`Region`].
     pub fn region(self, part: Rect) -> Self {
         Self { region: Some(part), ..self }
     }
 
-    /// `listener` hears of progress as each stage begins; where the pair is matched [once more](Search::FOUND), from 0 on again. It may answer with a [`ControlFlow`]; a break ends the match with
-    /// [`Error::Interrupted`].
+    /// `listener` receives the progress as each stage begins. If the pair is matched [again](Search::AUTOMATIC), it
+    /// restarts at 0. The listener may return a [`ControlFlow`]; a break ends the match with [`Error::Interrupted`].
     pub fn on_progress<A: Answer>(self, mut listener: impl FnMut(Progress) -> A + Send + 'a) -> Self {
         Self { listener: Some(Box::new(move |progress| listener(progress).goes_on())), ..self }
     }
 
-    /// The match ends with [`Error::Interrupted`] soon after `cancel` becomes true.
+    /// Ends the match with [`Error::Interrupted`] soon after `cancel` becomes true.
     pub fn cancel(self, cancel: &'a AtomicBool) -> Self {
         Self { cancel: Some(cancel), ..self }
     }
 
-    /// `inspect` looks into the match on its way, for diagnosis. It may read any volume and map, at the price of time.
+    /// `inspect` inspects the running match for diagnosis. It may read any volume and map, which takes time.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn inspect(self, inspect: impl FnMut(&mut Inspection) -> Result<()> + Send + 'a) -> Self {
         Self { inspect: Some(Box::new(inspect)), ..self }
@@ -113,19 +113,19 @@ impl<'a> Job<'a> {
     /// Matches the pair.
     ///
     /// # Errors
-    /// [`Error::Range`] for the disparities to search, [`Error::Option`] for options out of range, [`Error::Budget`] where no
-    /// tile is small enough for the method's memory, [`Error::Device`] where the wanted device fails, [`Error::Memory`] when
-    /// the machine or the device cannot hold the match, [`Error::Interrupted`] when it was stopped, [`Error::Mismatch`] for a
-    /// [region](Job::region) that is not inside the view, and those of [`Job::inspect`].
+    /// [`Error::Range`] for the disparities to search, [`Error::Option`] for options out of range, [`Error::Budget`]
+    /// when no tile is small enough for the method's memory, [`Error::Device`] when the wanted device fails,
+    /// [`Error::Memory`] when the machine or the device cannot hold the match, [`Error::Interrupted`] when it was
+    /// stopped, [`Error::Mismatch`] for a [region](Job::region) outside the view, and those of [`Job::inspect`].
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run(self) -> Result<Matched> {
         pollster::block_on(self.run_async())
     }
 
-    /// As `run`, for a browser: between stages the thread does its other work.
+    /// Like `run`, for a browser: between stages the thread can do other work.
     ///
     /// # Errors
-    /// Those of `run`.
+    /// The errors of `run`.
     pub async fn run_async(self) -> Result<Matched> {
         let Self { matcher, pair, find, found, method, region, cancel, mut listener, mut inspect } = self;
         let (width, height) = pair.size();
@@ -138,7 +138,7 @@ impl<'a> Job<'a> {
         };
         let inspector = inspect.as_mut().map(|inspect| &mut **inspect as _);
         let method = method.unwrap_or(&own);
-        // Who looks in sees one match.
+        // An inspector sees a single match.
         let once = !found || inspector.is_some();
         let region = region.as_ref();
         let matched = matcher.solve_part(pair, region, range, method, &mut observer, inspector).await?;
@@ -148,25 +148,25 @@ impl<'a> Job<'a> {
             Ok(again) if check::goes_beyond(&again.maps, range) => {
                 Ok(Matched { range_found: found, ..again })
             }
-            // One that finds nothing beyond, or that is too large: nobody asked for it.
+            // Keep the first match if the wider range finds nothing more or does not fit.
             Ok(_) | Err(Error::Range(_) | Error::Budget(_) | Error::Memory(_)) => Ok(matched),
             Err(e) => Err(e),
         }
     }
 
-    /// Matches the pair, and writes the disparities to `out` as well, row by row, in pixels, `+inf` where there is none.
+    /// Matches the pair, and also writes the disparities to `out`, row by row, in pixels, `+inf` where there is none.
     ///
     /// # Errors
-    /// Those of [`Job::run`], and [`Error::Mismatch`] when `out` has not as many elements as the maps have pixels.
+    /// The errors of [`Job::run`], and [`Error::Mismatch`] when `out` does not have one element per pixel of the maps.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run_into(self, out: &mut [f32]) -> Result<Matched> {
         pollster::block_on(self.run_into_async(out))
     }
 
-    /// As `run_into`, for a browser.
+    /// Like `run_into`, for a browser.
     ///
     /// # Errors
-    /// Those of `run_into`.
+    /// The errors of `run_into`.
     pub async fn run_into_async(self, out: &mut [f32]) -> Result<Matched> {
         let (width, height) = self.region.as_ref().map_or(self.pair.size(), Rect::size);
         if out.len() != width * height {

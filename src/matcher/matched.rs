@@ -1,4 +1,4 @@
-//! What a match gives.
+//! The result of a match.
 
 use crate::backend::{Backend, Stage, Traffic};
 use crate::engine::Solution;
@@ -13,7 +13,7 @@ use crate::program::tiles::Tiles;
 use crate::sigma::Sigma;
 use std::time::Duration;
 
-/// The maps of a pair, and what made them.
+/// The maps of a pair, and how they were computed.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Matched {
@@ -21,38 +21,38 @@ pub struct Matched {
     pub maps: Maps,
     /// Iterations done, of all phases together; the most of any tile.
     pub iterations: u32,
-    /// What was corrected in the pair before it was matched.
+    /// The corrections that were made to the pair before it was matched.
     pub conditioning: Conditioning,
-    /// The plan that was followed, for the whole image; [`Plan::doubled`] says by which it was matched at twice its size.
+    /// The plan of the whole image; [`Plan::doubled`] is its plan at twice the size.
     pub plan: Plan,
     /// Whether sparse matches found the range.
     pub range_found: bool,
-    /// How the image was cut for it: one tile where it was not.
+    /// The tiles of the image: one if it was not cut.
     pub tiles: Tiles,
-    /// What ran the stages, for people.
+    /// The backend that ran the stages, in readable form.
     pub ran_on: String,
-    /// The driver of the device that did, as far as it says; `None` for the CPU path.
+    /// The driver of the device, if known; `None` for the CPU path.
     pub driver: Option<String>,
-    /// Why it did not run on the preferred device, where that is so.
+    /// Why the match did not run on the preferred device, if so.
     pub note: Option<Error>,
-    /// The time of every stage, in the order of their first run; empty unless they were asked for.
+    /// The time of every stage, in the order of their first run; empty if they were not timed.
     pub timings: Vec<Timing>,
-    /// What went through the device.
+    /// Data that went through the device.
     pub traffic: Traffic,
-    /// Labels of all pixels that the volumes of each level held, with padding; those of all tiles together.
+    /// Labels that the volumes of each level held, over all pixels, with padding; summed over all tiles.
     pub cells: Vec<u64>,
 }
 
 /// The time that a stage took, over all its runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Timing {
-    /// The stage, or what the host does around the stages: "illumination", "upload", "zones" and the like.
+    /// The stage, or a host step between stages: "illumination", "upload", "zones" and the like.
     pub stage: &'static str,
-    /// Its level, where it has one.
+    /// Its level, if it has one.
     pub level: Option<usize>,
-    /// How often it ran.
+    /// Number of runs.
     pub runs: u32,
-    /// All runs together, by the device's own clock where it has one.
+    /// Time of all runs, by the device's clock if it has one.
     pub time: Duration,
 }
 
@@ -91,20 +91,20 @@ impl Matched {
         self.maps.raw_map()
     }
 
-    /// How far the best runner-up is behind, in 1/8 nat, 0 to 255, as a mean over the pixels around; those with another disparity
-    /// count 0. It is 0 where nothing was measured.
+    /// The lead of the best label over its runner-up, in 1/8 nat, 0 to 255, averaged over the neighbourhood;
+    /// pixels there with another disparity count 0. It is 0 where nothing was measured.
     #[must_use]
     pub fn confidence(&self) -> &Plane<u8> {
         &self.maps.confidence
     }
 
-    /// The error to expect of every measured disparity, in pixels, from its confidence; `+inf` where nothing was measured.
+    /// The expected error of every measured disparity, in pixels, from its confidence; `+inf` where nothing was measured.
     #[must_use]
     pub fn sigma(&self) -> Plane<f32> {
-        Sigma::of(&self.plan.method).map(&self.maps)
+        Sigma::for_method(&self.plan.method).map(&self.maps)
     }
 
-    /// Why each pixel is what it is: bits of [`flag`](crate::maps::flag), 0 where it is measured and trusted.
+    /// The state of each pixel: bits of [`flag`](crate::maps::flag), 0 where it is measured and trusted.
     #[must_use]
     pub fn validity(&self) -> &Plane<u8> {
         &self.maps.validity
@@ -116,17 +116,17 @@ impl Matched {
         self.plan.of_pair().range
     }
 
-    /// What is probably wrong with the pair or the range, as the maps show.
+    /// The likely faults of the pair or the range, from the maps.
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
         let mut warnings = check::warnings_of(&self.maps, self.range());
-        // What is far away has matches: what ends there is wrong, and not cut off.
+        // Distant surfaces have sparse matches, so disparities at the lower end of a found range are errors.
         warnings.retain(|w| !self.range_found || !matches!(w, Warning::Clipped { upper: false, .. }));
         warnings
     }
 }
 
-/// One entry a stage and level.
+/// Sums the times by stage and level.
 pub(super) fn summed(solution: &Solution, times: &[(Stage, Duration)]) -> Vec<Timing> {
     let mut all: Vec<Timing> = Vec::new();
     let host = solution.host_times.iter().map(|&(name, time)| (name, None, time));

@@ -1,4 +1,4 @@
-//! The front door: from pairs to their maps. It opens what runs the stages, checks it, and falls back where that is allowed.
+//! The entry point: matches pairs. It opens a backend, checks it, and falls back to the CPU path if allowed.
 
 mod check;
 mod job;
@@ -27,12 +27,12 @@ use check::check;
 pub use job::{Answer, Job};
 use matched::summed;
 pub use matched::{Matched, Timing};
-pub use search::{Found, Search};
+pub use search::{AutoRange, Search};
 #[cfg(not(target_arch = "wasm32"))]
 pub use shared::SharedMatcher;
 use std::sync::Arc;
 
-/// Chooses what a [`Matcher`] does, and where.
+/// Configures a [`Matcher`].
 #[derive(Clone, Debug, Default)]
 #[must_use = "a builder does nothing until `build`"]
 pub struct Builder {
@@ -41,19 +41,19 @@ pub struct Builder {
 }
 
 impl Builder {
-    /// The method; the preset `default` where none is given.
+    /// The method; the default is the preset `default`.
     pub fn method(self, method: Method) -> Self {
         Self { method, ..self }
     }
 
-    /// What runs the stages: `"auto"`, `"cpu"`, `"gpu"`, or the index of a device or a part of its name. No choice changes a bit
-    /// of the maps.
+    /// The backend: `"auto"`, `"cpu"`, `"gpu"`, or the index of a device or a part of its name. The choice
+    /// does not change the maps.
     pub fn device(mut self, device: impl Into<DeviceChoice>) -> Self {
         self.execution.device = device.into();
         self
     }
 
-    /// Threads of the CPU path, at most; the [usual](crate::threads::usual) number where none are given.
+    /// The most threads of the CPU path; by default the [usual](crate::threads::usual) number.
     pub fn threads(mut self, threads: usize) -> Self {
         self.execution.threads = Some(threads);
         self
@@ -65,7 +65,7 @@ impl Builder {
         self
     }
 
-    /// Device, threads and timings at once.
+    /// Sets device, threads and timings at once.
     pub fn execution(self, execution: Execution) -> Self {
         Self { execution, ..self }
     }
@@ -73,24 +73,23 @@ impl Builder {
     /// Opens the device.
     ///
     /// # Errors
-    /// [`Error::Execution`] for what makes no sense and for a device that is not there, [`Error::Device`] where there is no
-    /// driver or the device cannot be opened.
+    /// [`Error::Execution`] for invalid choices and for a device that does not exist, [`Error::Device`] when
+    /// there is no driver or the device cannot be opened.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn build(self) -> Result<Matcher> {
         pollster::block_on(self.build_async())
     }
 
-    /// As `build`, for a browser, where nobody may wait.
+    /// Like `build`, for a browser, which must not block.
     ///
     /// # Errors
-    /// [`Error::Execution`] for what makes no sense and for a device that is not there, [`Error::Device`] where there is no
-    /// driver or the device cannot be opened.
+    /// The errors of `build`.
     pub async fn build_async(self) -> Result<Matcher> {
         let threads = Arc::new(Threads::new(self.execution.threads)?);
         self.build_on(threads).await
     }
 
-    /// With threads that there are already.
+    /// Builds a matcher on existing threads.
     async fn build_on(self, threads: Arc<Threads>) -> Result<Matcher> {
         let Self { method, execution } = self;
         let open = |wanted| Gpu::open_async(wanted, FaultInjection::default());
@@ -105,41 +104,41 @@ impl Builder {
     }
 }
 
-/// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
+/// Matches pairs one after another, and keeps the device, its compiled shaders and its buffers in between.
 pub struct Matcher {
     method: Method,
     threads: Arc<Threads>,
-    /// The CPU path, with what it keeps from match to match: one for each pair that was matched beside others.
+    /// CPU paths with their reusable memory: one for each pair that was matched in parallel.
     cpus: Vec<Cpu>,
     gpu: Option<Gpu>,
-    /// The last method that the device was seen to compute as the CPU path does.
+    /// The last method whose maps on this device were verified against the CPU path.
     checked: Option<Method>,
-    /// Whether the CPU path may step in.
+    /// Whether the CPU path may replace a failing device.
     falls_back: bool,
-    /// Why there is no device any more.
+    /// The error because of which the device was dropped.
     given_up: Option<Error>,
     timings: bool,
 }
 
 impl Matcher {
-    /// A matcher of the preset `default`, on a GPU where there is one and on the CPU path where there is none.
+    /// A matcher of the preset `default`, on a GPU if there is one, else on the CPU path.
     ///
     /// # Errors
-    /// Those of [`Builder::build`].
+    /// The errors of [`Builder::build`].
     #[cfg(not(target_arch = "wasm32"))]
     pub fn new() -> Result<Self> {
         Self::builder().build()
     }
 
-    /// A matcher of other choices.
+    /// Configures a matcher.
     pub fn builder() -> Builder {
         Builder::default()
     }
 
-    /// On `gpu`; where that fails or cannot serve, on the CPU path if it `falls_back`.
+    /// A matcher on `gpu`; if that fails or cannot serve, on the CPU path if it `falls_back`.
     ///
     /// # Errors
-    /// [`Error::Execution`] for a number of threads that cannot be had, and the error of `gpu` unless it falls back.
+    /// [`Error::Execution`] for an invalid number of threads, and the error of `gpu` unless it falls back.
     pub fn on(gpu: Result<Gpu>, falls_back: bool, execution: &Execution) -> Result<Self> {
         let threads = Arc::new(Threads::new(execution.threads)?);
         Self::build(Method::default(), Some(gpu), falls_back, threads, execution.timings)
@@ -165,7 +164,7 @@ impl Matcher {
         self.method = method;
     }
 
-    /// Measures the time of every stage from now on, or no longer.
+    /// Turns per-stage timing on or off.
     pub fn keep_time(&mut self, on: bool) {
         self.timings = on;
     }
@@ -187,7 +186,7 @@ impl Matcher {
         Ok(Matched { maps: region.maps_of(&matched.maps), ..matched })
     }
 
-    /// Matches `pair`, and tells of it as asked.
+    /// Matches `pair` on the device, or on the CPU path.
     async fn solve(
         &mut self,
         pair: &Pair,
@@ -226,15 +225,15 @@ impl Matcher {
         Ok(Matched { note, ..matched })
     }
 
-    /// The failure of a device as a note, where the CPU path may step in: the bits are the same there, so it costs only time.
+    /// The failure of a device as a note, if the CPU path may replace it. The maps are the same there, so it only costs time.
     ///
     /// # Errors
-    /// The failure, where it may not.
+    /// The failure, if the CPU path may not replace the device.
     fn without_device(&mut self, failure: Error) -> Result<Error> {
         if !self.falls_back || !matches!(failure, Error::Device(_) | Error::Memory(_)) {
             return Err(failure);
         }
-        // What is too large for it this time may fit the next.
+        // The next match may fit even if this one is too large.
         if matches!(failure, Error::Device(_)) {
             self.gpu = None;
             self.given_up = Some(failure.clone());

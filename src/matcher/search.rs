@@ -1,4 +1,4 @@
-//! Which disparities a match searches: a range, or the one that sparse matches find.
+//! The disparities that a match searches: a given range, or one from sparse matches.
 
 use crate::error::Result;
 use crate::front::check;
@@ -6,18 +6,18 @@ use crate::image::Pair;
 use crate::options::DisparityRange;
 use std::ops::{RangeFull, RangeInclusive};
 
-/// The disparities to search: `0..=47`, or `..` for the range that sparse matches find in the pair.
+/// The disparities to search: `0..=47`, or `..` for the range of the sparse matches of the pair.
 pub trait Search: Send {
-    /// Whether the range is that of sparse matches. Near surfaces may lack these: where a match shows that the scene probably goes
-    /// beyond it, the pair is matched once more, over [half as many labels more](crate::check::wider). What this gives is taken where
-    /// it [finds](crate::check::goes_beyond) surfaces there.
-    const FOUND: bool = false;
+    /// Whether the range comes from sparse matches, which near surfaces may lack. If the maps suggest that the
+    /// scene goes beyond the range, the pair is matched again with [half as many labels
+    /// more](crate::check::wider). That result counts if it [finds](crate::check::goes_beyond) surfaces there.
+    const AUTOMATIC: bool = false;
 
     /// The range for `pair`.
     ///
     /// # Errors
-    /// [`Error::Range`](crate::Error::Range) for a range that makes no sense, and where none is found;
-    /// [`Error::Memory`](crate::Error::Memory) when the machine has not enough to look for one.
+    /// [`Error::Range`](crate::Error::Range) for an invalid range, and when none is found;
+    /// [`Error::Memory`](crate::Error::Memory) when the machine has too little memory to find one.
     fn range(self, pair: &Pair) -> Result<DisparityRange>;
 }
 
@@ -33,12 +33,12 @@ impl Search for RangeInclusive<i32> {
     }
 }
 
-/// A range that sparse matches have found.
+/// A range that was found from sparse matches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Found(pub DisparityRange);
+pub struct AutoRange(pub DisparityRange);
 
-impl Search for Found {
-    const FOUND: bool = true;
+impl Search for AutoRange {
+    const AUTOMATIC: bool = true;
 
     fn range(self, _: &Pair) -> Result<DisparityRange> {
         Ok(self.0)
@@ -46,7 +46,7 @@ impl Search for Found {
 }
 
 impl Search for RangeFull {
-    const FOUND: bool = true;
+    const AUTOMATIC: bool = true;
 
     fn range(self, pair: &Pair) -> Result<DisparityRange> {
         check::range(pair)

@@ -1,9 +1,9 @@
-//! Pair after pair: a device is never left without work, and the CPU path matches several pairs side by side.
+//! Sequences of pairs: a device always has work queued, and the CPU path matches several pairs in parallel.
 
 use super::check::check;
 use super::{Matched, Matcher};
 use crate::backend::Backend;
-use crate::engine::{self, Match};
+use crate::engine::{self, MatchRun};
 use crate::error::Result;
 use crate::image::Pair;
 use crate::options::{DisparityRange, Method};
@@ -15,15 +15,15 @@ use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 
 impl Matcher {
-    /// Matches pair after pair, each over its range, and hands the results to `take`, in order, until it breaks.
+    /// Matches pairs in order, each over its range, and passes each result to `take` until it breaks.
     ///
-    /// While a device is at one pair, the next one's graphs are built and go up, and the maps of the one before come down. (Not
-    /// where a pair is cut into tiles or matched at twice its size.) The CPU path matches as many pairs side by side as it has
-    /// threads, if so many come and fit in the method's memory and in that of the machine; `take` has a thread of its own there.
-    /// Where the stages are timed, one pair is matched after the other.
+    /// While a device matches one pair, the graphs of the next are built and uploaded, and the maps of the
+    /// previous one are downloaded, unless a pair is cut into tiles or matched at twice its size. The CPU path
+    /// matches as many pairs in parallel as it has threads, if they fit in the memory of the method and of the
+    /// machine; `take` runs on its own thread there. With per-stage timing, pairs are matched one at a time.
     ///
     /// # Errors
-    /// Those of [`Job::run`](super::Job::run); the results of all pairs before have been handed out then.
+    /// The errors of [`Job::run`](super::Job::run), after the results of all earlier pairs.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run_all(
         &mut self,
@@ -33,10 +33,10 @@ impl Matcher {
         pollster::block_on(self.run_all_async(pairs, take))
     }
 
-    /// As `run_all`, and ends with [`Error::Interrupted`](crate::Error::Interrupted) soon after `cancel` becomes true.
+    /// Like `run_all`, but ends with [`Interrupted`](crate::Error::Interrupted) soon after `cancel` is set.
     ///
     /// # Errors
-    /// Those of [`Job::run`](super::Job::run); the results of all pairs before have been handed out then.
+    /// The errors of [`Job::run`](super::Job::run), after the results of all earlier pairs.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run_all_until(
         &mut self,
@@ -47,10 +47,10 @@ impl Matcher {
         pollster::block_on(self.run_each(pairs, cancel, take))
     }
 
-    /// As `run_all`, for a browser: one pair after the other, and `take` in the thread that there is.
+    /// Like `run_all`, for a browser: one pair at a time, and `take` on the only thread.
     ///
     /// # Errors
-    /// Those of [`Job::run_async`](super::Job::run_async); the results of all pairs before have been handed out then.
+    /// The errors of [`Job::run_async`](super::Job::run_async), after the results of all earlier pairs.
     pub async fn run_all_async(
         &mut self,
         pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
@@ -69,7 +69,7 @@ impl Matcher {
         let method = &self.method.clone();
         let observer: Observer = &mut |_| goes_on([cancel]);
         let mut last: Option<Flight> = None;
-        // A device may be lost on the way.
+        // The device may be lost during the sequence.
         while self.gpu.is_some() || self.timings || cfg!(target_arch = "wasm32") {
             let Some((pair, range)) = pairs.next() else { break };
             let started = self.start(&pair, range, method, &mut *observer).await;
@@ -97,14 +97,14 @@ impl Matcher {
         Ok(())
     }
 
-    /// Starts a match on the device, where it can be left to itself.
+    /// Starts a match on the device, if it needs no host steps in between.
     async fn start(
         &mut self,
         pair: &Pair,
         range: DisparityRange,
         method: &Method,
         observer: Observer<'_>,
-    ) -> Result<Option<(Tiles, Match)>> {
+    ) -> Result<Option<(Tiles, MatchRun)>> {
         let Self { threads, gpu: Some(device), checked, timings: false, .. } = self else { return Ok(None) };
         let (width, height) = pair.size();
         let plan = Plan::new(width, height, range, method)?;
@@ -124,7 +124,7 @@ impl Matcher {
         }
     }
 
-    /// Ends a match that was started on the device; where that has failed meanwhile, matches once more without it.
+    /// Completes a match that was started on the device; if the device has failed, matches again without it.
     async fn land(&mut self, flight: Flight, method: &Method, observer: Observer<'_>) -> Result<Matched> {
         let Flight { pair, range, tiles, started } = flight;
         let (width, height) = pair.size();
@@ -144,5 +144,5 @@ struct Flight {
     pair: Pair,
     range: DisparityRange,
     tiles: Tiles,
-    started: Match,
+    started: MatchRun,
 }

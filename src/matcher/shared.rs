@@ -1,4 +1,4 @@
-//! A matcher for several threads, and for processes that are forked.
+//! A matcher for several threads and for forked processes.
 
 use super::{Builder, Matcher};
 use crate::error::Result;
@@ -7,8 +7,8 @@ use crate::process::PerProcess;
 use crate::threads::Threads;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A matcher that several threads use in turns. A process that is forked makes its own, by the same choices: the threads of a matcher do not
-/// come along, and neither does its device.
+/// A matcher that several threads use in turns. A forked process makes its own with the same configuration,
+/// because the threads and the device of a matcher do not survive a fork.
 pub struct SharedMatcher {
     builder: Builder,
     threads: Arc<Threads>,
@@ -19,7 +19,7 @@ impl SharedMatcher {
     /// Opens the device.
     ///
     /// # Errors
-    /// Those of [`Builder::build`].
+    /// The errors of [`Builder::build`].
     pub fn new(builder: Builder) -> Result<Self> {
         let threads = Arc::new(Threads::new(builder.execution.threads)?);
         let shared = Self { builder, threads, own: PerProcess::new() };
@@ -27,10 +27,10 @@ impl SharedMatcher {
         Ok(shared)
     }
 
-    /// Does `work` with the matcher, when no other thread uses it any more.
+    /// Runs `work` with the matcher, once no other thread uses it.
     ///
     /// # Errors
-    /// That of `work`, and in another process than the first those of [`Builder::build`].
+    /// The error of `work`, and in a forked process the errors of [`Builder::build`].
     pub fn turn<T>(&self, work: impl FnOnce(&mut Matcher) -> Result<T>) -> Result<T> {
         let mut own = self.own.get().lock().unwrap_or_else(PoisonError::into_inner);
         let matcher = match own.take() {
@@ -40,10 +40,10 @@ impl SharedMatcher {
         work(own.insert(matcher))
     }
 
-    /// Does `work` around a match of `pair` on the threads of the matcher, such as [checks](crate::check). It waits for no match.
+    /// Runs `work` for `pair`, such as [checks](crate::check), on the matcher's threads, without waiting.
     ///
     /// # Errors
-    /// [`ExecutionError`](crate::error::ExecutionError) where the system does not start the threads.
+    /// [`ExecutionError`](crate::error::ExecutionError) if the system does not start the threads.
     pub fn share<T: Send>(&self, pair: &Pair, work: impl FnOnce() -> T + Send) -> Result<T> {
         let (width, height) = pair.size();
         Ok(self.threads.pool(width * height)?.install(work))

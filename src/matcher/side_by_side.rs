@@ -1,7 +1,7 @@
-//! The pairs of a sequence side by side on the CPU path.
+//! Matches the pairs of a sequence in parallel on the CPU path.
 //!
-//! Some steps of a match cannot be shared among threads, and others are too short for it where images are small. So each thread
-//! takes a pair of its own where enough of them wait, and helps with the rows of another one where none does.
+//! Some steps of a match are sequential, and others are too short to parallelize if images are small. So each
+//! thread takes its own pair while enough of them wait, and otherwise helps with the rows of another.
 
 use super::{Matched, Matcher, timed};
 use crate::error::{ExecutionError, Purpose, Result};
@@ -18,10 +18,10 @@ use std::sync::mpsc::{Receiver, channel, sync_channel};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-/// Matches `pairs`, and hands the results to `take`, in order, until it breaks.
+/// Matches `pairs`, and passes the results to `take`, in order, until it breaks.
 ///
 /// # Errors
-/// Those of a match; the results of all pairs before have been handed out then.
+/// The errors of a match, after the results of all pairs before have been passed on.
 pub(super) fn side_by_side(
     matcher: &mut Matcher,
     pairs: impl Iterator<Item = (Pair, DisparityRange)>,
@@ -38,7 +38,7 @@ pub(super) fn side_by_side(
         let mut cpu = {
             let mut idle = locked(&cpus);
             let cpu = idle.pop().unwrap_or_default();
-            // What idle ones keep must not be too much beside this one.
+            // Limit the memory that idle CPU paths keep.
             idle.truncate(
                 usize::try_from(room.most.1 / bytes.max(1)).unwrap_or(usize::MAX).saturating_sub(1),
             );
@@ -63,7 +63,7 @@ pub(super) fn side_by_side(
                 let share = room.share(planned.as_ref().map_or(0, |(_, bytes)| *bytes));
                 let (answer, answered) = sync_channel(1);
                 if begun.send(answered).is_err() {
-                    // Nobody takes any more.
+                    // `take` has ended.
                     break;
                 }
                 scope.spawn(move |_| {
@@ -75,12 +75,12 @@ pub(super) fn side_by_side(
         });
         taking.join().unwrap_or_else(|panic| resume_unwind(panic))
     });
-    // Pairs that come one by one need no more.
+    // Later single pairs need only one.
     locked(&cpus).truncate(1);
     ended
 }
 
-/// The tiles of a match, and the most bytes that it takes.
+/// The tiles of a match, and the most bytes that it needs.
 fn planned(pair: &Pair, range: DisparityRange, method: &Method) -> Result<(Tiles, u64)> {
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, method)?;
@@ -90,16 +90,16 @@ fn planned(pair: &Pair, range: DisparityRange, method: &Method) -> Result<(Tiles
     Ok((tiles, bytes))
 }
 
-/// Hands what was found to `take`, in the order in which it was begun.
+/// Passes the results to `take`, in the order in which the matches were begun.
 ///
 /// # Errors
-/// That of the first match that failed.
+/// The error of the first match that failed.
 fn hand_out(
     answers: &Receiver<Receiver<Result<Matched>>>,
     mut take: impl FnMut(Matched) -> ControlFlow<()>,
 ) -> Result<()> {
     for answered in answers {
-        // Where there is no answer its match has panicked, and whoever began it does so, too.
+        // Without an answer, the match has panicked, and so will the thread that began it.
         let Ok(matched) = answered.recv() else { break };
         if take(matched?).is_break() {
             break;
@@ -108,9 +108,9 @@ fn hand_out(
     Ok(())
 }
 
-/// What the matches that are under way may take together, and what they do.
+/// The capacity for running matches, and its use.
 struct Room {
-    /// Matches and bytes.
+    /// Number of matches, and bytes.
     most: (usize, u64),
     taken: Mutex<(usize, u64)>,
     freed: Condvar,
@@ -121,7 +121,7 @@ impl Room {
         Self { most: (matches, bytes), taken: Mutex::new((0, 0)), freed: Condvar::new() }
     }
 
-    /// Waits until a match that takes `bytes` may begin: beside no other one it always may.
+    /// Waits until a match that needs `bytes` may begin: always if it is the only one.
     fn share(&self, bytes: u64) -> Share<'_> {
         let waits = |&mut (matches, taken): &mut (usize, u64)| {
             let all = taken.saturating_add(bytes);
@@ -135,7 +135,7 @@ impl Room {
     }
 }
 
-/// What one match takes of a [`Room`].
+/// The share of one match in a [`Room`].
 struct Share<'a> {
     room: &'a Room,
     bytes: u64,
@@ -158,14 +158,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn matches_share_what_there_is() {
+    fn matches_share_the_capacity() {
         let room = Room::new(2, 100);
         let taken = || *locked(&room.taken);
         let first = room.share(60);
         let second = room.share(40);
         assert_eq!(taken(), (2, 100));
         thread::scope(|scope| {
-            // A third one is too many, whatever it takes.
+            // A third match is too many, whatever it needs.
             let third = scope.spawn(|| drop(room.share(0)));
             assert!(!third.is_finished());
             drop(first);
@@ -173,7 +173,7 @@ mod tests {
         });
         drop(second);
         assert_eq!(taken(), (0, 0));
-        // One that takes more than there is has the room for itself.
+        // A match larger than the capacity runs alone.
         let large = room.share(1000);
         thread::scope(|scope| {
             let small = scope.spawn(|| drop(room.share(1)));

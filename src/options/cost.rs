@@ -50,22 +50,22 @@ words! {
     }
 }
 
-/// What is true of a matching cost.
+/// Properties of a matching cost.
 #[derive(Clone, Copy, Debug)]
 pub struct CostFacts {
-    /// The largest cost of a label, and so of one outside the image.
+    /// Largest cost of a label, and so of one outside the image.
     pub most: f64,
     /// Cost units that stand for a cost of 1.
     pub units: f64,
-    /// Cost units of the largest colour difference, where colour has its full weight.
+    /// Cost units of the largest colour difference at full weight.
     pub colour_weight: u32,
-    /// Whether the costs of a row can be computed at any time from what is taken of both views before, so that
-    /// level 0 need not be held whole.
+    /// Whether the costs of a row can be computed at any time from features of both views, so that level 0
+    /// need not be held whole.
     pub by_rows: bool,
 }
 
 impl MatchingCost {
-    /// What is true of it.
+    /// The properties of the cost.
     #[must_use]
     pub const fn facts(self) -> CostFacts {
         match self {
@@ -101,12 +101,12 @@ options! {
         /// that none is preferred. It may not be larger than the largest matching cost.
         outside_cost: f64 = 0.7, takes real(0.0..=MatchingCost::Sad.facts().most), unit "as the matching cost", source "open";
         /// How a level's cost volume comes from the next finer one.
-        pyramid: Pyramid = Pyramid::Minimum, takes one_of(Pyramid::WORDS), source "section 2.4: low-pass; open along the labels", of readings;
+        pyramid: Pyramid = Pyramid::Minimum, takes one_of(Pyramid::WORDS), source "section 2.4: low-pass; open along the labels", for reproduction;
     }
 }
 
 impl CostOptions {
-    /// Checks what a row alone cannot: the range of `outside_cost` depends on `matching`.
+    /// Checks what a single row cannot: the range of `outside_cost` depends on `matching`.
     pub(super) fn check(&self) -> Result<(), (String, OptionError)> {
         let (value, high) = (self.outside_cost, self.matching.facts().most);
         if value <= high {

@@ -4,33 +4,33 @@ use crate::threads;
 use std::convert::Infallible;
 use std::str::FromStr;
 
-/// Where and how a match runs; nothing here changes a bit of the result.
+/// Where and how a match runs; this does not change the maps.
 #[derive(Clone, Debug, Default)]
 pub struct Execution {
-    /// What runs the stages.
+    /// The device that runs the stages.
     pub device: DeviceChoice,
-    /// Threads of the CPU path, 1 to [`Execution::MOST_THREADS`]; `None` takes the [usual](threads::usual) number. There are
-    /// no more than four for each processor, and of more than eight no more than one for each 1024 pixels of a pair: others would only
-    /// wait.
+    /// Threads of the CPU path, 1 to [`Execution::MOST_THREADS`]; `None` takes the [usual](threads::usual)
+    /// number. Four per processor, and beyond eight one per 1024 pixels of a pair, are the limit: more would
+    /// only wait.
     pub threads: Option<usize>,
     /// Whether to measure the time of every stage.
     pub timings: bool,
 }
 
 impl Execution {
-    /// The largest number of threads: more than any match can share, and few enough for every system.
+    /// The largest number of threads: more than any match can use, and few enough for every system.
     pub const MOST_THREADS: usize = threads::MOST;
 }
 
-/// What runs the stages of a match.
+/// The choice of the device that runs a match.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum DeviceChoice {
-    /// A discrete GPU, else an integrated one, else the CPU path. The CPU path also steps in where the GPU fails.
+    /// A discrete GPU, else an integrated one, else the CPU path, which also replaces a GPU that fails.
     #[default]
     Auto,
     /// The CPU path.
     Cpu,
-    /// The GPU that `Auto` prefers, else a software driver of Vulkan or Metal; an error where there is none.
+    /// The GPU that `Auto` prefers, else a software driver of Vulkan or Metal; an error if there is none.
     Gpu,
     /// The GPU or driver with this index in the list of devices, or with this text in its name.
     Named(String),
@@ -51,7 +51,7 @@ impl From<&str> for DeviceChoice {
 impl FromStr for DeviceChoice {
     type Err = Infallible;
 
-    /// As [`DeviceChoice::from`].
+    /// Like [`DeviceChoice::from`].
     fn from_str(text: &str) -> Result<Self, Infallible> {
         Ok(text.into())
     }
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_word_is_a_name() {
+    fn any_other_text_is_a_name() {
         for (text, device) in [
             ("auto", DeviceChoice::Auto),
             ("cpu", DeviceChoice::Cpu),

@@ -32,7 +32,7 @@ options! {
     "front" FrontOptions {
         /// Correction of the illumination of both images.
         illumination: Illumination = Illumination::None, takes one_of(Illumination::WORDS),
-            source "sections 2.4 and 3.1: homomorphic", of readings;
+            source "sections 2.4 and 3.1: homomorphic", for reproduction;
         /// Moves the right view up or down by the median vertical offset of sparse matches, from a sixteenth
         /// of a row on.
         level_rows: bool = true, takes Takes::Switch, source "not in the paper";
@@ -43,11 +43,11 @@ options! {
         denoise: bool = true, takes Takes::Switch, source "not in the paper";
         /// Number of clusters into which K-means sorts the Gabor responses of the reference image, for
         /// texture zones. Used if zone-sigmas is above 0.
-        clusters: u32 = 15, takes whole(1..=64), unit "clusters", source "section 3.1: 15", of readings;
+        clusters: u32 = 15, takes whole(1..=64), unit "clusters", source "section 3.1: 15", for reproduction;
         /// What a texture zone is.
-        zone_extent: ZoneExtent = ZoneExtent::Region, takes one_of(ZoneExtent::WORDS), source "section 2.4: region", of readings;
+        zone_extent: ZoneExtent = ZoneExtent::Region, takes one_of(ZoneExtent::WORDS), source "section 2.4: region", for reproduction;
         /// Limits the labels of a pixel to this many standard deviations around the mean disparity of its
         /// zone's sparse matches; 0 keeps all labels, and so does a zone of fewer than 10 matches.
-        zone_sigmas: f64 = 0.0, takes real(0.0..=100.0), unit "standard deviations", source "section 2.4: 1", of readings;
+        zone_sigmas: f64 = 0.0, takes real(0.0..=100.0), unit "standard deviations", source "section 2.4: 1", for reproduction;
     }
 }

@@ -32,12 +32,12 @@ options! {
         temperature: f64 = 0.25, takes real(1e-3..=1e6), unit "cost per nat",
             source "equation 5 read in the logarithmic domain; open";
         /// Largest evidence against a label.
-        evidence_cap: f64 = 8.0, takes real(0.25..=63.75), unit "nats", source "not in the paper", of readings;
+        evidence_cap: f64 = 8.0, takes real(0.25..=63.75), unit "nats", source "not in the paper", for reproduction;
         /// How many times stronger the evidence of a level is than that of the next finer one: it is a mean
         /// over more pixels.
-        evidence_gain: f64 = 4.0, takes real(1.0..=4.0), unit "factor per level", source "open", of readings;
+        evidence_gain: f64 = 4.0, takes real(1.0..=4.0), unit "factor per level", source "open", for reproduction;
         /// Potential of factors whose members disagree.
-        potential: Potential = Potential::Soft, takes one_of(Potential::WORDS), source "section 2.2: hard", of readings;
+        potential: Potential = Potential::Soft, takes one_of(Potential::WORDS), source "section 2.2: hard", for reproduction;
         /// Cost of disagreement in a dependency factor; hard potentials do not use it.
         dependency_truncation: f64 = 2.0, takes real(0.25..=255.75), unit "nats", source "not in the paper";
         /// Cost of labels that differ by one in a dependency factor of a level coarser than the finest, where a slanted surface has
@@ -45,7 +45,7 @@ options! {
         label_step: f64 = 0.75, takes real(0.25..=255.75), unit "nats", source "not in the paper";
         /// Which labels of two levels agree.
         agreement: Agreement = Agreement::Interpolating, takes one_of(Agreement::WORDS),
-            source "section 2.2; open for odd labels", of readings;
+            source "section 2.2; open for odd labels", for reproduction;
         /// Cost of disagreement in a resolution factor; hard potentials do not use it.
         resolution_truncation: f64 = 3.0, takes real(0.25..=255.75), unit "nats", source "not in the paper";
     }

@@ -12,7 +12,7 @@ use super::schedule::ScheduleOptions;
 use super::tiles::TileOptions;
 use crate::error::{Error, OptionError, Result};
 
-/// Every option that determines the bits of the result, given the pair and the range.
+/// All options that determine the maps of a given pair and range.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -27,9 +27,9 @@ pub struct Method {
     pub messages: MessageOptions,
     /// Order and number of iterations.
     pub schedule: ScheduleOptions,
-    /// What is done with the disparity map afterwards.
+    /// Post-processing of the disparity map.
     pub refinement: RefinementOptions,
-    /// When a pair is cut into tiles.
+    /// Matching in tiles.
     pub tiles: TileOptions,
 }
 
@@ -50,7 +50,7 @@ pub(super) fn keys() -> impl Iterator<Item = (&'static Group, &'static Key)> {
 }
 
 impl Method {
-    /// All values: a table for each group, with a value for each key.
+    /// All values, as a table for each group with a value for each key.
     ///
     /// # Panics
     /// Never: every field is a plain value.
@@ -68,7 +68,7 @@ impl Method {
         Ok(self)
     }
 
-    /// Names the first key that is out of its range.
+    /// Finds the first key that is out of its range.
     pub(super) fn check(&self) -> Result<(), (String, OptionError)> {
         let table = self.table();
         for (group, key) in keys() {

@@ -1,11 +1,11 @@
-//! The options of a match: [`Method`] holds all that determine the bits of the result, [`Execution`] those that do not.
+//! The options of a match: [`Method`] holds all that determine the maps, [`Execution`] those that do not.
 //!
-//! The options of a method are in groups, one file for each. An option is one row in the file of its group: add a row, and
-//! its field, validation, listing and documentation follow (see [`Key`]). Presets that differ from the row's default
-//! say so in `presets.rs`.
+//! The options of a method are in groups, one file each. An option is one row in the file of its group: its
+//! field, validation, listing and documentation follow from the row (see [`Key`]). Presets that differ from
+//! the row's default say so in `presets.rs`.
 //!
-//! A [`Method`] is read from TOML or set key by key. No two groups share a key, so `sad-window` says as much as
-//! `cost.sad-window`; both are read.
+//! A [`Method`] is read from TOML or set key by key. No two groups share a key, so both `sad-window` and
+//! `cost.sad-window` are accepted.
 //!
 //! Sections are those of Shabanian and Balasubramanian, *Multi-Resolution Factor Graph Based Stereo Correspondence
 //! Algorithm*; "open" means that the paper leaves the choice open.

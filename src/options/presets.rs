@@ -1,4 +1,4 @@
-//! Presets: `default` is what the rows state, the others say what differs.
+//! Presets: the rows of the options define `default`; the others list their differences.
 
 use super::{
     Agreement, CostOptions, Fill, FrontOptions, GraphOptions, Illumination, LeftRightCheck, MatchSize,
@@ -10,15 +10,15 @@ use crate::text::one_line;
 /// A preset: its row in [`PRESETS`].
 #[derive(Clone, Copy, Debug)]
 pub struct Preset {
-    /// Its name, as users write it.
+    /// Its name.
     pub name: &'static str,
-    /// What it is for.
+    /// Its purpose.
     pub about: &'static str,
     make: fn() -> Method,
 }
 
 impl Preset {
-    /// The method that it stands for.
+    /// The method of the preset.
     #[must_use]
     pub fn method(&self) -> Method {
         (self.make)()
@@ -63,15 +63,15 @@ impl Method {
         })
     }
 
-    /// Nearest to the truth, in 8 times the default's time: matches the pair at twice its size, too.
+    /// Closest to the truth, in 8 times the default's time: also matches the pair at twice its size.
     #[must_use]
     pub fn accurate() -> Self {
         let schedule = ScheduleOptions { match_size: MatchSize::Double, ..ScheduleOptions::default() };
         Self { schedule, ..Self::default() }
     }
 
-    /// This method for a pair at twice the size, where it asks for one. The pair has been conditioned, and the median sees as much of the
-    /// scene as in the pair itself.
+    /// This method for the pair at twice the size, if it is to be matched so. The pair is conditioned
+    /// already, and the median covers the same area of the scene.
     pub(crate) fn at_double_size(&self) -> Option<Self> {
         let refinement = &self.refinement;
         (self.schedule.match_size == MatchSize::Double).then(|| Self {
@@ -91,8 +91,8 @@ impl Method {
         })
     }
 
-    /// Matches the pair at half its size, in a quarter of the default's time: for video and robots. The finest level only listens
-    /// to the coarser ones, and the median is smaller.
+    /// Matches the pair at half its size, in a quarter of the default's time: for video and robots. The
+    /// finest level only receives messages from the coarser ones, and the median is smaller.
     #[must_use]
     pub fn fast() -> Self {
         Self {
@@ -102,9 +102,9 @@ impl Method {
                 final_iterations: 0,
                 ..ScheduleOptions::default()
             },
-            // At half the size, steps help in rooms and harm on desks.
+            // At half the size, a larger label step helps in rooms and harms on desks.
             messages: MessageOptions { temperature: 0.35, label_step: 2.0, ..MessageOptions::default() },
-            // Labels lead by less after fewer iterations.
+            // After fewer iterations, the best label leads by less.
             refinement: RefinementOptions {
                 median_window: 9,
                 confidence_floor: 8,
@@ -114,8 +114,8 @@ impl Method {
         }
     }
 
-    /// The paper's whole method, with its choices wherever it states them. Where it leaves one open, the preset takes what brings
-    /// the printed tables nearest, the same for all pairs; `docs/paper.md` tells what that is.
+    /// The paper's whole method, with its choices wherever it states them. Where it leaves one open, the
+    /// preset takes what brings the printed tables closest, the same for all pairs; see `docs/paper.md`.
     #[must_use]
     pub fn paper() -> Self {
         Self {
@@ -179,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn presets_are_what_their_names_say() {
+    fn presets_match_their_names() {
         for (i, preset) in PRESETS.iter().enumerate() {
             let (name, method) = (preset.name, preset.method());
             assert_eq!(Method::preset(name).unwrap(), method);

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::error::{Error, RangeError, Result};
 
-/// Most labels of a range: what 16-bit label indices and every device's limits allow.
+/// Most labels of a range, limited by 16-bit label indices and by devices.
 pub const MAX_LABELS: usize = 16_384;
 /// Largest absolute disparity: the fixed-point maps hold 1/256 px in 32 bits with room for differences.
 pub const MAX_DISPARITY: i32 = 1 << 20;
@@ -39,7 +39,7 @@ impl DisparityRange {
         Ok(Self { min, max })
     }
 
-    /// The range, if any disparity of it leads from some pixel to another within images of `width` columns.
+    /// Checks that some disparity of the range connects two pixels of images with `width` columns.
     ///
     /// # Errors
     /// [`Error::Range`] when none does.
@@ -53,10 +53,10 @@ impl DisparityRange {
         }
     }
 
-    /// The range that the same surfaces have in a pair of twice the size.
+    /// The range of the same surfaces in a pair of twice the size.
     ///
     /// # Errors
-    /// [`Error::Range`] when it is beyond [`MAX_LABELS`] or [`MAX_DISPARITY`], with what may be doubled.
+    /// [`Error::Range`] beyond [`MAX_LABELS`] or [`MAX_DISPARITY`], with the limit before doubling.
     pub fn doubled(self) -> Result<Self> {
         let Self { min, max } = self;
         Self::new(2 * min, 2 * max).map_err(|error| match error {
@@ -70,7 +70,7 @@ impl DisparityRange {
         })
     }
 
-    /// The range that the same surfaces have in a pair of half the size.
+    /// The range of the same surfaces in a pair of half the size.
     #[must_use]
     pub fn halved(self) -> Self {
         Self { min: self.min.div_euclid(2), max: -((-self.max).div_euclid(2)) }
@@ -86,7 +86,7 @@ impl DisparityRange {
 impl TryFrom<RangeInclusive<i32>> for DisparityRange {
     type Error = Error;
 
-    /// As [`DisparityRange::new`].
+    /// Like [`DisparityRange::new`].
     fn try_from(range: RangeInclusive<i32>) -> Result<Self> {
         Self::new(*range.start(), *range.end())
     }
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_that_make_no_sense_are_refused() {
+    fn invalid_ranges_are_refused() {
         assert_eq!(DisparityRange::new(-3, -3).unwrap().labels(), 1);
         for (min, max, words) in [
             (5, 4, ["4 is", "below the minimum disparity 5"]),

@@ -1,4 +1,4 @@
-//! How a [`Method`] is read from TOML, and set key by key.
+//! Reads a [`Method`] from TOML, and sets single keys.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -14,12 +14,12 @@ use crate::error::{Error, OptionError, ReadError, Result};
 use crate::text;
 use crate::text::one_line;
 
-/// A config file is a few dozen lines; no more than this is read of one.
+/// The limit for a config file, which usually has a few dozen lines.
 const MAX_CONFIG_BYTES: u64 = 1 << 20;
 
-/// A key, as it was written, with its new value.
+/// A key, as written, with its new value.
 type Change = (String, toml::Value);
-/// The key that does not fit, as it was written, and why.
+/// A key with an invalid value or name, as written, and the reason.
 type Misfit = (String, OptionError);
 
 impl Method {
@@ -31,13 +31,13 @@ impl Method {
         self.set_all([(key, value)])
     }
 
-    /// Sets each key to its value; the last one counts where a key comes twice. What depends on two keys is checked once all
-    /// are set, so that their order does not matter.
+    /// Sets each key to its value; of repeated keys the last one counts. Constraints between keys are checked
+    /// at the end, so that their order does not matter.
     ///
     /// # Errors
-    /// As [`Method::set`].
+    /// The errors of [`Method::set`].
     pub fn set_all<'a>(&mut self, pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<()> {
-        // Bare words (`matching=sad`) are strings, everything else is TOML already.
+        // Bare words (`matching=sad`) are strings; everything else is TOML already.
         let value = |text: &str| match format!("value = {text}").parse::<toml::Table>() {
             Ok(mut table) if table.len() == 1 => table.remove("value"),
             _ => None,
@@ -48,10 +48,10 @@ impl Method {
         Ok(())
     }
 
-    /// Sets every key that the TOML file `path` holds, under the heading of its group or without one.
+    /// Sets every key in the TOML file `path`, with or without the heading of its group.
     ///
     /// # Errors
-    /// [`Error::Read`] when the file cannot be read, is no TOML, or holds a key or a value that does not fit; it names
+    /// [`Error::Read`] when the file cannot be read, is not TOML, or holds an invalid key or value; it names
     /// the line.
     pub fn load(&mut self, path: &Path) -> Result<()> {
         let text = String::from_utf8(text::read(path, MAX_CONFIG_BYTES, "config file")?)
@@ -66,7 +66,7 @@ impl Method {
         };
 
         let mut changes = Vec::new();
-        // Of each key that there is, by its name.
+        // The line of each key, by its name.
         let mut lines = HashMap::new();
         for (key, at, value) in entries(DeTable::parse(&text).map_err(broken)?.into_inner()) {
             let value = toml::Value::deserialize(ValueDeserializer::from(value)).map_err(broken)?;
@@ -91,14 +91,14 @@ impl Method {
             let (group, key, value) = stored.map_err(|cause| (name, cause))?;
             table[group.name][key.name()] = value;
         }
-        // Every value was checked on its own.
+        // Every value was checked by itself.
         let method: Self = table.try_into().expect("values that their keys take");
         method.check()?;
         Ok(method)
     }
 }
 
-/// The keys of a file, those of a group with its name in front, each with its place and value, from the top.
+/// The entries of a file in order: keys, with the group in front if there is one, places and values.
 fn entries(table: DeTable) -> Vec<(String, usize, Spanned<DeValue>)> {
     let mut entries = Vec::new();
     for (key, value) in table {
@@ -115,7 +115,7 @@ fn entries(table: DeTable) -> Vec<(String, usize, Spanned<DeValue>)> {
     entries
 }
 
-/// The key called `name`, with its group in front or without; else why there is none.
+/// The key called `name`, with or without its group in front.
 fn find(name: &str) -> Result<(&'static Group, &'static Key), OptionError> {
     let (group, key) = name.split_once('.').map_or((None, name), |(group, key)| (Some(group), key));
     match keys().find(|(_, found)| found.name() == key) {
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn what_depends_on_two_keys_is_checked_at_the_end() {
+    fn constraints_between_keys_are_checked_at_the_end() {
         for order in [[0, 1], [1, 0]] {
             let pairs = [("matching", "ad-census"), ("cost.outside-cost", "0.5")];
             let mut method = Method::paper();
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_key_and_what_it_takes() {
+    fn errors_name_the_key_and_its_values() {
         for (key, value, words) in [
             ("colour", "red", "colour: there is no such key"),
             ("graph.colour", "red", "graph.colour: there is no such key"),
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn every_preset_survives_a_file() {
+    fn every_preset_survives_a_round_trip_through_a_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("method.toml");
         for preset in PRESETS {

@@ -1,54 +1,54 @@
-//! How an option is declared: one row that holds its key, type, default, range, unit, source and meaning. The field of
-//! the group's struct with its documentation, the validation, the listing of `mrfgs presets`, config files and Python's
-//! documentation all follow from that row.
+//! Declares options: one row holds the key, type, default, range, unit, source and meaning of an option. The
+//! field of the group's struct with its documentation, the validation, the listing of `mrfgs presets`, config
+//! files and Python's documentation all follow from that row.
 
 use crate::error::OptionError;
 use serde::Serialize;
 use std::fmt;
 use std::ops::RangeInclusive;
 
-/// A group of options: the struct that holds their values has one field for each.
+/// A group of options, which are the fields of one struct.
 #[derive(Clone, Copy, Debug)]
 pub struct Group {
-    /// Its name, the heading in a config file: `cost`.
+    /// The name, which is the heading in a config file: `cost`.
     pub name: &'static str,
-    /// What its options are about.
+    /// The subject of its options.
     pub meaning: &'static str,
     /// Its options, in order.
     pub keys: &'static [Key],
 }
 
-/// An option: its row.
+/// An option, as declared by its row.
 #[derive(Clone, Copy, Debug)]
 pub struct Key {
     /// The name of the field.
     pub(super) field: &'static str,
-    /// Which values it takes.
+    /// The values that it takes.
     pub takes: Takes,
-    /// The unit of its values; empty where they have none.
+    /// The unit of its values; empty if they have none.
     pub unit: &'static str,
-    /// What it does.
+    /// The meaning of the option.
     pub meaning: &'static str,
-    /// Where it comes from: a section of the paper, with the paper's value, or other work. `open` means that the paper
+    /// The source: a section of the paper, with the paper's value, or other work. `open` means that the paper
     /// leaves the choice open.
     pub source: &'static str,
-    /// Whether only another reading of the paper turns it: lists of options leave it out unless it is asked for.
-    pub of_readings: bool,
+    /// Whether the option only reproduces other readings of the paper; lists leave these out unless asked.
+    pub for_reproduction: bool,
 }
 
 impl Key {
-    /// Its name, which no key of another group has: `sad-window`.
+    /// The name, unique among all groups: `sad-window`.
     #[must_use]
     pub fn name(&self) -> String {
         self.field.replace('_', "-")
     }
 
-    /// `value` as this key stores it; else what is wrong with it.
+    /// `value` as this key stores it, or why it is invalid.
     pub(super) fn checked(&self, value: toml::Value) -> Result<toml::Value, OptionError> {
         use toml::Value::{Boolean, Float, Integer, String};
         let outside = |value: f64, low: f64, high: f64| Err(OptionError::OutOfRange { value, low, high });
         let value = match (self.takes, value) {
-            // A whole number is also a real one.
+            // Whole numbers are valid for real keys.
             (Takes::Real { .. }, Integer(v)) => Float(v as f64),
             (_, value) => value,
         };
@@ -73,7 +73,7 @@ impl Key {
     }
 }
 
-/// The unit and the range: `pixels, odd, 1 to 31`.
+/// Shows the unit and the range: `pixels, odd, 1 to 31`.
 impl fmt::Display for Key {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match (self.unit, self.takes) {
@@ -84,7 +84,7 @@ impl fmt::Display for Key {
     }
 }
 
-/// Which values a key takes.
+/// The values that a key takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Takes {
     /// True or false.
@@ -109,7 +109,7 @@ pub enum Takes {
     },
 }
 
-/// The range: `1 to 31`.
+/// Shows the range: `1 to 31`.
 impl fmt::Display for Takes {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
@@ -146,16 +146,16 @@ pub(super) const fn one_of(words: &'static [Word]) -> Takes {
 /// A word that an option takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Word {
-    /// As users write it: `ad-census`.
+    /// The word as users write it: `ad-census`.
     pub word: &'static str,
-    /// What it means.
+    /// The meaning of the word.
     pub meaning: &'static str,
 }
 
-/// Declares a group of options: a struct with one field a row, its defaults, and `GROUP`, which describes it.
+/// Declares a group of options: a struct with a field per row, its defaults, and its description `GROUP`.
 ///
-/// A row reads: `/// meaning`, then `key: type = default, takes range, unit "..." (if any), source "...";`. `of readings` at its end
-/// says that only another reading of the paper turns it.
+/// A row reads: `/// meaning`, then `key: type = default, takes range, unit "..." (if any), source "...";`. A
+/// final `for reproduction` marks an option that only serves to reproduce other readings of the paper.
 macro_rules! options {
     (
         $(#[doc = $about:literal])+
@@ -163,7 +163,7 @@ macro_rules! options {
             $(
                 $(#[doc = $meaning:literal])+
                 $field:ident: $type:ty = $default:expr, takes $takes:expr, $(unit $unit:literal,)? source $source:literal
-                    $(, of $readings:ident)?;
+                    $(, for $purpose:ident)?;
             )+
         }
     ) => {
@@ -200,7 +200,7 @@ macro_rules! options {
                         unit: concat!($($unit)?),
                         meaning: concat!($($meaning),+).trim_ascii(),
                         source: $source,
-                        of_readings: !concat!($(stringify!($readings))?).is_empty(),
+                        for_reproduction: !concat!($(stringify!($purpose))?).is_empty(),
                     },
                 )+ ],
             };
@@ -208,7 +208,7 @@ macro_rules! options {
     };
 }
 
-/// Declares the words that an option takes: an enum with one variant a word, and `WORDS`, which describes them.
+/// Declares the words of an option: an enum with a variant per word, and their descriptions `WORDS`.
 macro_rules! words {
     (
         $(#[doc = $about:literal])+
@@ -230,7 +230,7 @@ macro_rules! words {
         }
 
         impl $name {
-            /// All of them.
+            /// All words.
             pub const ALL: &[Self] = &[ $( Self::$variant, )+ ];
 
             /// The words, as users write them.

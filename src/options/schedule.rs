@@ -33,7 +33,7 @@ options! {
         /// The size at which the pair is matched.
         match_size: MatchSize = MatchSize::Full, takes one_of(MatchSize::WORDS), source "not in the paper";
         /// The order in which levels exchange messages.
-        order: Order = Order::CoarseFirst, takes one_of(Order::WORDS), source "algorithm 1: together", of readings;
+        order: Order = Order::CoarseFirst, takes one_of(Order::WORDS), source "algorithm 1: together", for reproduction;
         /// Iterations of all levels together; with coarse-first, iterations after each level but the finest
         /// has joined.
         iterations: u32 = 3, takes whole(1..=1000), unit "iterations", source "section 3: 20 to 30";
@@ -41,6 +41,6 @@ options! {
         /// those of the coarser levels. Only coarse-first uses it.
         final_iterations: u32 = 1, takes whole(0..=1000), unit "iterations", source "not in the paper";
         /// Stop when the RMS change of the finest map from one iteration to the next is at most this; 0 runs all iterations.
-        tolerance: f64 = 0.0, takes real(0.0..=1e6), unit "pixels", source "algorithm 1", of readings;
+        tolerance: f64 = 0.0, takes real(0.0..=1e6), unit "pixels", source "algorithm 1", for reproduction;
     }
 }

@@ -2,13 +2,13 @@
 
 use super::row::{options, whole};
 
-/// The most memory that a match may be given, in MiB: 16 TiB.
+/// Most memory that a match may be given, in MiB: 16 TiB.
 pub const MAX_MEMORY: u32 = 1 << 24;
 
-/// A size of memory in MiB, such as that of "2GiB" or "512MiB".
+/// Parses a size of memory, such as "2GiB" or "512MiB", in MiB.
 ///
 /// # Errors
-/// What to give instead.
+/// A message that says what to give instead.
 pub fn mebibytes(text: &str) -> Result<u32, String> {
     let units = [("MiB", 0), ("GiB", 10), ("TiB", 20)];
     let size = units.into_iter().find_map(|(unit, shift)| {

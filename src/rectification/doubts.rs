@@ -1,22 +1,22 @@
-//! What is probably wrong with a rectification.
+//! Likely faults of a rectification.
 
-use crate::calibration::cameras::Views;
+use crate::calibration::cameras::RectifiedViews;
 use crate::calibration::lens::Lens;
 use crate::image::calib::{Calibration, Fit, Unit};
 
 use super::views::seen;
 
-/// A probable mistake in a calibration, or a weakness of matches that take its place. It displays as one line with the cause and the remedy.
+/// A likely fault of a calibration, or a weakness of matches that replace one. It displays as one line with the cause and the remedy.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Doubt {
-    /// A calibration of images of another size.
+    /// The calibration is for another size of the images.
     #[error("{fit}")]
     OtherSize {
-        /// How these come out of those.
+        /// How the images derive from the calibrated ones.
         fit: Fit,
     },
-    /// A calibration with the right camera on the left of the left one.
+    /// The calibration has the right camera to the left of the left one.
     #[error(
         "has the right camera on the left of the left one, so each was taken for the other{}",
         if *images { ", and by their matches the right image for the left one: maps are of that" } else { "" }
@@ -25,7 +25,7 @@ pub enum Doubt {
         /// Whether the images were exchanged too.
         images: bool,
     },
-    /// A distance of the cameras that hardly any have.
+    /// An implausible distance of the cameras.
     #[error(
         "has its cameras {} {} apart, and those of stereo cameras are 1 mm to 20 m apart, so the unit may be another one",
         digits(*baseline), unit.name()
@@ -36,7 +36,7 @@ pub enum Doubt {
         /// Its unit.
         unit: Unit,
     },
-    /// A focal length that no camera of a rectified pair has.
+    /// An implausible focal length for a rectified pair.
     #[error(
         "has a focal length of {} px, with which images {width} px wide show nearly half of the world, so it may be in millimetres",
         digits(*focal_length)
@@ -47,7 +47,7 @@ pub enum Doubt {
         /// The width of the images.
         width: usize,
     },
-    /// A calibration that does not say the size of its images, with the optical axis far from the middle of these.
+    /// The calibration does not say the size of its images, and the principal point is far from their middle.
     #[error(
         "the principal point of the {view} camera, ({:.1}, {:.1}), is {percent} % of the {} from the middle of images of \
          {} x {}, so the calibration may be for another size, which it does not say: give images of that size, or add \
@@ -61,24 +61,24 @@ pub enum Doubt {
         at: [f64; 2],
         /// Whether it is far off along the rows (0) or the columns (1).
         axis: usize,
-        /// How far, in percent of the size.
+        /// Its distance, in percent of the size.
         percent: u32,
         /// Width and height of the images.
         size: (usize, usize),
     },
-    /// A rectification that shows the images far from the middle of its views.
+    /// The rectified views show the images far from their middle.
     #[error(
         "shows the middle of the images at ({}, {}) in rectified views of {} x {}, so its projections may be for views of about \
          {} x {}: say their size by newImageSize: [{}, {}], or make them for {} x {}",
         at[0], at[1], size.0, size.1, 2 * at[0], 2 * at[1], 2 * at[0], 2 * at[1], size.0, size.1
     )]
     Middle {
-        /// Where the middle of the images is in the rectified views, in the mean of both, in pixels.
+        /// The position of the middle of the images in the rectified views, as the mean of both, in pixels.
         at: [i64; 2],
         /// Width and height of the views.
         size: (usize, usize),
     },
-    /// Matches alone, many of which do not agree.
+    /// Many of the matches that replace a calibration disagree.
     #[error(
         "only {percent} % of the matches agree, so the rectification may be wrong: check it, or calibrate the cameras"
     )]
@@ -86,7 +86,7 @@ pub enum Doubt {
         /// Matches that agree, in percent of all.
         percent: u32,
     },
-    /// Matches alone, whose rows stay apart.
+    /// The rows of the matches that replace a calibration remain apart.
     #[error(
         "rows are up to {pixels:.1} px apart: the lens may bend lines, or both images were not taken with one zoom: calibrate the \
          cameras for better maps"
@@ -95,34 +95,34 @@ pub enum Doubt {
         /// The 95th percentile, in pixels.
         pixels: f64,
     },
-    /// Matches alone, in a small part of the image.
+    /// The matches that replace a calibration cover a small part of the image.
     #[error(
         "the matches are in {percent} % of the image, and elsewhere rows may be apart: check that the images overlap"
     )]
     Coverage {
-        /// Parts of the image that have some, in percent of all.
+        /// Parts of the image with matches, in percent of all.
         percent: u32,
     },
-    /// Matches alone, nearly all of which one plane explains.
+    /// Nearly all matches that replace a calibration fit one plane.
     #[error(
         "all but {percent} % of the matches lie on one flat surface, which says little of how the camera moved: show things at \
          different distances"
     )]
     NearlyFlat {
-        /// The others, in percent of all.
+        /// The other matches, in percent of all.
         percent: u32,
     },
 }
 
-/// In millimetres: those of endoscopes and microscopes have a few, and the widest rigs that do not fly some metres. With the thousandth
-/// part or the thousandfold all handheld ones are outside.
+/// Plausible baselines in millimetres: a few for endoscopes and microscopes, some metres for the widest rigs
+/// on the ground. A handheld rig in a unit that is off by a factor of 1000 is outside.
 const BASELINES: std::ops::RangeInclusive<f64> = 1.0..=20_000.0;
 
-/// A rectified image this many focal lengths wide shows 157 degrees.
+/// The widest plausible image in focal lengths, which shows 157 degrees.
 const WIDEST: f64 = 10.0;
 
 impl Doubt {
-    /// The doubts about the calibration of a rectified pair, whose images have this width where it is known.
+    /// The doubts about the calibration of a rectified pair, whose images have this width if it is known.
     #[must_use]
     pub fn about(calibration: &Calibration, width: Option<usize>) -> Vec<Self> {
         let &Calibration { camera, baseline, unit, fit, exchanged, .. } = calibration;
@@ -138,13 +138,13 @@ impl Doubt {
     }
 }
 
-/// A doubt about the distance of two cameras, where its unit is known.
+/// The doubt about an implausible baseline, if its unit is known.
 pub(super) fn of_baseline(baseline: f64, unit: Unit) -> Option<Doubt> {
     let millimetres = baseline * unit.millimetres()?;
     (baseline > 0.0 && !BASELINES.contains(&millimetres)).then_some(Doubt::Baseline { baseline, unit })
 }
 
-/// A number with four digits, as a message shows it.
+/// A number with four significant digits, for messages.
 fn digits(number: f64) -> String {
     let before = libm::log10(number.abs()).floor() as i32;
     let after = usize::try_from(3 - before).unwrap_or(0).min(12);
@@ -152,11 +152,15 @@ fn digits(number: f64) -> String {
     if after == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').into() }
 }
 
-/// Cameras have it within a twentieth of the size; a calibration for 3/4 of the size is an eighth away.
+/// Suspect distance from the middle, by size: cameras are within 1/20; a calibration for 3/4 of it gives 1/8.
 const FAR: f64 = 0.1;
 
-/// A doubt about `views`, of images of these `sizes`, that may be for another size of the rectified images.
-pub(super) fn of_views(lenses: &[Lens; 2], views: &Views, sizes: [(usize, usize); 2]) -> Option<Doubt> {
+/// The doubt whether `views` belong to another size of the rectified images, given image `sizes`.
+pub(super) fn of_views(
+    lenses: &[Lens; 2],
+    views: &RectifiedViews,
+    sizes: [(usize, usize); 2],
+) -> Option<Doubt> {
     let rectified = views.size.unwrap_or(sizes[0]);
     let ends = [rectified.0, rectified.1].map(|end| end as f64);
     let at = [0, 1].map(|view| {
@@ -165,7 +169,7 @@ pub(super) fn of_views(lenses: &[Lens; 2], views: &Views, sizes: [(usize, usize)
         let camera = &views.cameras[view];
         [0, 1].map(|i| camera.focal_length[i] * point[i] + camera.principal_point[i])
     });
-    // Cameras that look towards each other show it to the left and to the right.
+    // Converging cameras show it shifted to opposite sides.
     let mean = [0, 1].map(|i| f64::midpoint(at[0][i], at[1][i]));
     let far = |i: usize| (mean[i] / ends[i] - 0.5).abs() > FAR;
     let known = mean.iter().all(|v| v.abs() < 1e6);
@@ -173,7 +177,7 @@ pub(super) fn of_views(lenses: &[Lens; 2], views: &Views, sizes: [(usize, usize)
         .then(|| Doubt::Middle { at: mean.map(|v| v.round() as i64), size: rectified })
 }
 
-/// A doubt about `lenses` that may be for images of other sizes than these.
+/// The doubt about `lenses` that seem to be for images of other sizes.
 pub(super) fn of_lenses(lenses: &[Lens; 2], sizes: [(usize, usize); 2]) -> Option<Doubt> {
     let off = |view: usize, axis: usize| {
         let end = [sizes[view].0, sizes[view].1][axis] as f64;

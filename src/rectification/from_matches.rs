@@ -1,35 +1,35 @@
-//! Rectification without a calibration: by matches of the pair alone.
+//! Rectification by the matches of a pair, without a calibration.
 
 use super::trust::Trust;
 use super::two_views::{Correspondence, TwoViews};
 use super::{Options, Rectification, views};
-use crate::calibration::cameras::Views;
+use crate::calibration::cameras::RectifiedViews;
 use crate::calibration::matrix::{IDENTITY, rotation};
 use crate::error::{RectificationError, Result};
 use crate::image::calib::{Camera, Unit};
 
-/// Fewer matches than this that agree show no geometry.
+/// Fewest agreeing matches that show the geometry.
 const LEAST: usize = 30;
-/// Of all matches at least one in this many must agree.
+/// At least one in this many of all matches must agree.
 const ONE_IN: usize = 2;
-/// The least share of matches that one plane does not explain (open).
+/// The least share of matches off any single plane (open).
 const OFF_ONE_PLANE: f64 = 0.05;
-/// The image is divided into this many parts along each side, to see how much of it has matches.
+/// Parts along each side of the image, in which matches are counted.
 const PARTS: usize = 8;
 
 impl Rectification {
-    /// The rectification of images of `size` by `matches` of theirs alone, without a calibration: for two photographs of one camera
-    /// that was moved to the side, by hand.
+    /// The rectification of images of `size` by their `matches`, without a calibration: for two photographs
+    /// of one camera that was moved to the side by hand.
     ///
-    /// Both images are taken for those of one pinhole with its axis in the middle; its focal length and how it moved are found
-    /// (Fusiello and Irsara 2008), and the views are then chosen as by [`Rectification::new`]. What is infinitely far has a disparity of
-    /// about 0, or of some pixels of either sign, where the matches say little of the focal length. There is no scale, so
-    /// [`Rectification::calibration`] is an error.
+    /// Both images are assumed to be from one pinhole camera with its axis in the middle; its focal length and
+    /// motion are estimated (Fusiello and Irsara 2008), and the views are then chosen as in [`Rectification::new`].
+    /// Points at infinity have a disparity of about 0, or of some pixels of either sign if the matches determine
+    /// the focal length poorly. There is no scale, so [`Rectification::calibration`] is an error.
     ///
     /// # Errors
-    /// [`Error::Rectification`](crate::Error::Rectification) where too few matches agree, where one plane or a mere turn of the camera
-    /// explains them all, and where the camera moved forward; [`Error::Calibration`](crate::Error::Calibration) for an alpha outside of 0
-    /// to 1.
+    /// [`Error::Rectification`](crate::Error::Rectification) when too few matches agree, when all fit one
+    /// plane or a mere rotation of the camera, and when the camera moved forward;
+    /// [`Error::Calibration`](crate::Error::Calibration) for an alpha outside 0 to 1.
     pub fn of_matches(matches: &[Correspondence], size: (usize, usize), options: &Options) -> Result<Self> {
         options.check()?;
         let (views, agreeing) = geometry(matches, size)?;
@@ -58,7 +58,7 @@ impl Rectification {
         Ok(found)
     }
 
-    /// The same without a look at what it is worth, and the matches that agree: for a better one to follow.
+    /// A rectification without an assessment, and the matches that agree, to be refined.
     pub(crate) fn roughly(
         matches: &[Correspondence],
         size: (usize, usize),
@@ -67,12 +67,12 @@ impl Rectification {
         Ok((Self::of_geometry(&views, &agreeing, size, &Options::default())?, agreeing))
     }
 
-    /// What turns the right view alone, counter-clockwise by an angle in radians: for a search of views that differ by about that.
+    /// Rotates the right view alone, counter-clockwise by an angle in radians: to search views that differ by about that.
     pub(crate) fn turning_right(size: (usize, usize), angle: f64) -> Result<Self> {
         let start = TwoViews::start(size);
         let lens = start.lens()?;
         let camera = Camera { focal_length: lens.focal_length, principal_point: lens.principal_point };
-        let views = Views {
+        let views = RectifiedViews {
             rotations: [IDENTITY, rotation([0.0, 0.0, -angle])],
             cameras: [camera; 2],
             translation: [-1.0, 0.0],
@@ -109,20 +109,20 @@ impl Rectification {
             .map_err(|_| RectificationError::Forward.into())
     }
 
-    /// How far apart the rows of a match are in the rectified views, in pixels.
+    /// The row distance of a match in the rectified views, in pixels.
     fn rows_apart(&self, of: &Correspondence) -> f64 {
         let [left, right] = [0, 1].map(|view| self.rectified(view, of[view]));
         (left[1] - right[1]).abs()
     }
 
-    /// Where a rectified view shows a pixel of its image.
+    /// The position in a rectified view of a pixel of its image.
     pub(crate) fn rectified(&self, view: usize, pixel: [f64; 2]) -> [f64; 2] {
         let camera = &self.views.cameras[view];
         let at = views::seen(&self.lenses[view], &self.views.rotations[view], pixel);
         [0, 1].map(|i| camera.focal_length[i] * at[i] + camera.principal_point[i])
     }
 
-    /// How far it can be trusted, where it comes [from matches alone](Self::of_matches).
+    /// How reliable the rectification is, if it comes [from matches alone](Self::of_matches).
     #[must_use]
     pub fn trust(&self) -> Option<&Trust> {
         self.trust.as_ref()
@@ -134,17 +134,17 @@ fn is_flat(off_one_plane: f64) -> bool {
     off_one_plane < OFF_ONE_PLANE
 }
 
-/// How the views stand, and the matches that agree with it.
+/// The geometry of the views, and the matches that agree with it.
 fn geometry(matches: &[Correspondence], size: (usize, usize)) -> Result<(TwoViews, Vec<Correspondence>)> {
     let few = |agreeing| RectificationError::Few { agreeing, matches: matches.len(), least: LEAST };
-    let views = TwoViews::of(matches, size).ok_or_else(|| few(0))?;
+    let views = TwoViews::estimate(matches, size).ok_or_else(|| few(0))?;
     let tolerance = TwoViews::tolerance(size);
     let agreeing: Vec<_> =
         matches.iter().filter(|of| views.distance(of).abs() <= tolerance).copied().collect();
     if agreeing.len() < LEAST || ONE_IN * agreeing.len() < matches.len() {
         return Err(few(agreeing.len()).into());
     }
-    // Where one plane explains all, the way may be any.
+    // Matches on one plane leave the direction undetermined.
     match views.is_forward() {
         true if is_flat(views.share_off_one_plane(&agreeing)) => Err(RectificationError::Flat.into()),
         true => Err(RectificationError::Forward.into()),

@@ -1,6 +1,6 @@
-//! The solution of normal equations.
+//! Solves normal equations.
 
-/// The solution of `matrix` x = `right`, by elimination; `None` where there is none.
+/// The solution of `matrix` x = `right` by elimination; `None` if there is none.
 pub(crate) fn solved<const N: usize>(mut matrix: [[f64; N]; N], mut right: [f64; N]) -> Option<[f64; N]> {
     for i in 0..N {
         let pivot = (i..N).max_by(|&a, &b| matrix[a][i].abs().total_cmp(&matrix[b][i].abs()))?;
@@ -29,7 +29,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equations_are_solved_and_others_are_not() {
+    fn regular_equations_are_solved_and_singular_ones_refused() {
         let found = solved([[0.0, 2.0, 1.0], [1.0, 1.0, 0.0], [3.0, 0.0, -1.0]], [7.0, 3.0, 0.0]).unwrap();
         assert!(found.iter().zip([1.0, 2.0, 3.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
         assert_eq!(solved([[1.0, 2.0], [2.0, 4.0]], [1.0, 2.0]), None);

@@ -1,8 +1,8 @@
-//! Rectified pairs from images as the cameras took them: by a calibration, or by matches of the pair alone.
+//! Rectifies raw images by a calibration, or by matches of the pair alone.
 //!
-//! The rectified views are those of Bouguet's method, as OpenCV's `stereoRectify` chooses them. The place in the image that each
-//! of their pixels shows is computed in double precision, with the same bits on every platform, and rounded to 1/256 px;
-//! values are interpolated by cubics in integers.
+//! The rectified views are chosen by Bouguet's method, like OpenCV's `stereoRectify`. The source position of
+//! each of their pixels is computed in double precision, with the same bits on every platform, and rounded to
+//! 1/256 px; values are interpolated by cubics in integers.
 //!
 //! ```
 //! use mrfgs::rectification::{Options, Rectification};
@@ -35,7 +35,7 @@ pub use options::Options;
 pub use trust::Trust;
 pub use two_views::Correspondence;
 
-use crate::calibration::cameras::{StereoCalibration, Views};
+use crate::calibration::cameras::{RectifiedViews, StereoCalibration};
 use crate::calibration::lens::{Distortion, Lens};
 use crate::calibration::matrix::{IDENTITY, Matrix, product, rotated, rotation, transposed};
 use crate::error::{Error, Purpose, Result};
@@ -47,50 +47,50 @@ use crate::threads::prelude::*;
 use sampling::{NOWHERE, Place};
 use std::borrow::Cow;
 
-/// How a pair of images becomes a rectified pair.
+/// The mapping from a pair of images to a rectified pair.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rectification {
     lenses: [Lens; 2],
-    /// Their epipolar lines are rows.
-    views: Views,
+    /// The rectified views, whose epipolar lines are rows.
+    views: RectifiedViews,
     /// (width, height) of the images of both views.
     images: [(usize, usize); 2],
-    /// That of the rectified views: the same as of the left image, unless the calibration says another.
+    /// (width, height) of the rectified views: that of the left image, unless the calibration has another.
     size: (usize, usize),
     unit: Unit,
-    /// Whether the left view is made of the right image, and the right one of the left image.
+    /// Whether the left view is made from the right image, and the right view from the left image.
     exchanged: bool,
     doubts: Vec<Doubt>,
-    /// Where it comes from matches alone, without a scale.
+    /// Set if it comes from matches alone, without a scale.
     trust: Option<Trust>,
-    /// Where the pixels of both rectified views come from, row by row, where they are [kept](Self::keep_places).
+    /// The source positions for both rectified views, row by row, if [kept](Self::keep_places).
     places: Option<[Vec<Place>; 2]>,
 }
 
 impl Rectification {
-    /// The rectification of images of `size` by a calibration: that which the calibration holds, unless the options ask for
-    /// another one, or else Bouguet's.
+    /// The rectification of images of `size` by a calibration: that which the calibration holds, or Bouguet's
+    /// if there is none or the options ask for another.
     ///
-    /// Where one camera is above the other, the views are turned by a quarter, so that rows are epipolar lines and the right
-    /// view is to the right: the upper camera is the left one after a quarter turn counter-clockwise, the lower one after a
-    /// quarter turn clockwise.
+    /// If one camera is above the other, the views are rotated by a quarter turn, so that rows are epipolar
+    /// lines and the right view is to the right: the upper camera is the left one after a quarter turn
+    /// counter-clockwise, the lower one after a quarter turn clockwise.
     ///
-    /// A calibration of images of another size counts where that is a smaller or larger form of the whole, or of the part that cameras of
-    /// this make give. Where the right camera is on the left of the left one, each is taken for the other, and the images stay: see
-    /// [`Rectification::for_pair`]. [`Rectification::doubts`] tells of both.
+    /// A calibration for images of another size is used if these are scaled, or cropped as cameras of this
+    /// make do. If the right camera is to the left of the left one, the cameras are exchanged, but not the
+    /// images: see [`Rectification::for_pair`]. [`Rectification::doubts`] reports both.
     ///
     /// # Errors
-    /// [`Error::Calibration`] when the calibration lacks the lenses or how they stand, when its rectification contradicts how they stand, or
-    /// when no rectified views exist or one of them shows next to nothing; [`Error::Mismatch`] when it is for images of another size.
+    /// [`Error::Calibration`] when the calibration lacks the lenses or the pose, when its rectification contradicts the pose, or when
+    /// no rectified views exist or one of them shows next to nothing; [`Error::Mismatch`] when it is for images of another size.
     pub fn new(calibration: &StereoCalibration, size: (usize, usize), options: &Options) -> Result<Self> {
         Self::of_sizes(calibration, [size; 2], options)
     }
 
-    /// The same of left and right images of these sizes. The rectified views have the size of the left images, unless the calibration says
-    /// another one.
+    /// Like [`Rectification::new`], for left and right images of these sizes. The rectified views have the
+    /// size of the left images, unless the calibration has another.
     ///
     /// # Errors
-    /// Those of [`Rectification::new`].
+    /// The errors of [`Rectification::new`].
     pub fn of_sizes(
         calibration: &StereoCalibration,
         sizes: [(usize, usize); 2],
@@ -122,7 +122,7 @@ impl Rectification {
         if calibration.size.is_none() {
             doubts.extend(doubts::of_lenses(&lenses, sizes));
         }
-        // Views that are chosen here are around the middle of the images.
+        // Views that are chosen here are always centred.
         if calibration.views.is_some() && options.alpha.is_none() {
             doubts.extend(doubts::of_views(&lenses, &views, sizes));
         }
@@ -131,10 +131,10 @@ impl Rectification {
         Self::of_views(&lenses, views, sizes, calibration.unit, doubts)
     }
 
-    /// That by `views`, turned where need be.
+    /// The rectification by `views`, rotated if they are vertical.
     fn of_views(
         lenses: &[Lens; 2],
-        views: Views,
+        views: RectifiedViews,
         images: [(usize, usize); 2],
         unit: Unit,
         doubts: Vec<Doubt>,
@@ -151,17 +151,17 @@ impl Rectification {
             found.exchanged = found.images != images;
             found.doubts.insert(0, Doubt::Exchanged { images: found.exchanged });
         }
-        // Says where both cameras are in one place.
+        // Fails if both cameras are in one place.
         found.views.calibration(None, unit)?;
         found.check_shown().map(|()| found)
     }
 
-    /// Whether the calibration has the right camera on the left of the left one, so that the cameras were exchanged and the images not.
+    /// Whether the calibration has the right camera to the left of the left one, so that the cameras were exchanged, but not the images.
     pub(crate) fn has_exchanged_cameras(&self) -> bool {
         self.doubts.contains(&Doubt::Exchanged { images: false })
     }
 
-    /// The same with the left view made of the right image, and the right one of the left image.
+    /// The same rectification, with the images exchanged too.
     pub(crate) fn with_images_exchanged(mut self) -> Self {
         self.exchanged = true;
         for doubt in &mut self.doubts {
@@ -172,7 +172,7 @@ impl Rectification {
         self
     }
 
-    /// An error where a view shows next to nothing of its image.
+    /// An error if a view shows next to nothing of its image.
     fn check_shown(&self) -> Result<()> {
         const STEPS: usize = 48;
         const LEAST: f64 = 0.05;
@@ -197,7 +197,7 @@ impl Rectification {
         Ok(())
     }
 
-    /// What is probably wrong with the calibration, or with the matches.
+    /// Likely faults of the calibration, or of the matches.
     #[must_use]
     pub fn doubts(&self) -> &[Doubt] {
         &self.doubts
@@ -209,24 +209,24 @@ impl Rectification {
         self.size
     }
 
-    /// Where the left image (the right one where they were [exchanged](Doubt::Exchanged)) shows what the rectified left view has at (x, y),
-    /// in pixels. `None` where it cannot show it; what
-    /// is found may still be outside of the image.
+    /// The position in the left image (the right one if they were [exchanged](Doubt::Exchanged)) of the point
+    /// (x, y) of the rectified left view, in pixels. `None` if the lens cannot show it; the position may be
+    /// outside the image.
     #[must_use]
     pub fn left(&self, x: f64, y: f64) -> Option<[f64; 2]> {
         self.source(0, x, y)
     }
 
-    /// The same for the right views.
+    /// Like [`Rectification::left`], for the right view.
     #[must_use]
     pub fn right(&self, x: f64, y: f64) -> Option<[f64; 2]> {
         self.source(1, x, y)
     }
 
-    /// [`Rectification::left`] and [`Rectification::right`] of every pixel: x, then y; +infinity where there is nothing.
+    /// [`Rectification::left`] and [`Rectification::right`] for every pixel: x, then y; +infinity where there is none.
     ///
     /// # Errors
-    /// [`Error::Memory`] when the system has not enough memory.
+    /// [`Error::Memory`] when the system has too little memory.
     pub fn maps(&self) -> Result<[[Plane<f32>; 2]; 2]> {
         let (width, height) = self.size();
         let values = (width as u64).saturating_mul(height as u64).saturating_mul(4);
@@ -240,11 +240,11 @@ impl Rectification {
         }))
     }
 
-    /// Finds out now where each pixel comes from, instead of for each pair: for many pairs of the same cameras. It keeps 16
-    /// bytes a pixel, and changes no bit of what [`Rectification::apply`] gives.
+    /// Computes the source positions of all pixels once, instead of for each pair: for many pairs of the same
+    /// cameras. It takes 16 bytes per pixel, and does not change the result of [`Rectification::apply`].
     ///
     /// # Errors
-    /// [`Error::Memory`] when the system has not enough memory.
+    /// [`Error::Memory`] when the system has too little memory.
     pub fn keep_places(&mut self) -> Result<()> {
         let (width, height) = self.size();
         let of_view = |view: usize| {
@@ -270,11 +270,11 @@ impl Rectification {
         self.lenses[view].project(rotated(&back, [(x - cx) / fx, (y - cy) / fy, 1.0]))
     }
 
-    /// The rectified pair. A pixel is masked where its source is not in the image, or masked, or where one of the sixteen pixels
-    /// is that its value takes. A pair of 8-bit levels stays one.
+    /// Rectifies a pair. A pixel is masked if its source is masked or outside the image, or if one of the
+    /// sixteen pixels around it that contribute is. A pair of 8-bit levels stays one.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] when the pair is of another size; [`Error::Memory`] when the system has not enough memory.
+    /// [`Error::Mismatch`] when the pair is of another size; [`Error::Memory`] when the system has too little memory.
     pub fn apply(&self, pair: &Pair) -> Result<Pair> {
         let (mut images, mut sizes) = ([pair.left(), pair.right()], pair.own_sizes());
         if self.exchanged {
@@ -306,7 +306,7 @@ impl Rectification {
     /// The calibration of the rectified pair.
     ///
     /// # Errors
-    /// [`Error::Calibration`] where the pair was rectified by [matches alone](Self::of_matches), which show no scale.
+    /// [`Error::Calibration`] when the pair was rectified by [matches alone](Self::of_matches), which show no scale.
     pub fn calibration(&self) -> Result<Calibration> {
         if self.trust.is_some() {
             return Err(Error::Calibration(
@@ -316,10 +316,10 @@ impl Rectification {
         self.views.calibration(Some(self.size()), self.unit)
     }
 
-    /// That of a pair that is rectified already, which changes nothing: by the cameras of its calibration.
+    /// The identity for a rectified pair, with the cameras of its calibration.
     ///
     /// # Errors
-    /// [`Error::Calibration`] where it lacks the camera or the baseline.
+    /// [`Error::Calibration`] when it lacks the camera or the baseline.
     pub fn of_rectified(calibration: &Calibration, size: (usize, usize)) -> Result<Self> {
         let Calibration { camera: Some(left), baseline: Some(baseline), .. } = *calibration else {
             return Err(Error::Calibration("does not say the cameras, cam0 and baseline".into()));
@@ -328,22 +328,23 @@ impl Rectification {
         right.principal_point[0] += calibration.doffs.unwrap_or(0.0);
         let found = Self::of_cameras([left, right], size)?;
         let translation = [-baseline, 0.0];
-        Ok(Self { views: Views { translation, ..found.views }, unit: calibration.unit, ..found })
+        Ok(Self { views: RectifiedViews { translation, ..found.views }, unit: calibration.unit, ..found })
     }
 
-    /// The same by these cameras, whose distance does not matter.
+    /// The identity for these cameras, with an arbitrary baseline.
     pub(crate) fn of_cameras(cameras: [Camera; 2], size: (usize, usize)) -> Result<Self> {
         let lens = |camera: Camera| Lens::new(camera.focal_length, camera.principal_point, Distortion::NONE);
         let lenses = [lens(cameras[0])?, lens(cameras[1])?];
-        let views = Views { rotations: [IDENTITY; 2], cameras, translation: [-1.0, 0.0], size: None };
+        let views =
+            RectifiedViews { rotations: [IDENTITY; 2], cameras, translation: [-1.0, 0.0], size: None };
         Self::of_views(&lenses, views, [size; 2], Unit::default(), Vec::new())
     }
 
-    /// The same of a rig whose right camera has turned about this axis of its rectified view, as long as the angle in radians:
-    /// [`Turn::axis`](crate::drift::Turn::axis).
+    /// The same rectification for a rig whose right camera has rotated about this axis of its rectified view,
+    /// with the angle in radians as length: [`Turn::axis`](crate::drift::Turn::axis).
     ///
     /// # Errors
-    /// [`Error::Memory`] where it [keeps its places](Self::keep_places) and the machine has not enough for others.
+    /// [`Error::Memory`] if it [keeps its places](Self::keep_places) and memory is too small for new ones.
     pub fn with_right_turned(&self, axis: [f64; 3]) -> Result<Self> {
         let mut turned = Self { places: None, ..self.clone() };
         turned.views.rotations[1] = product(&rotation(axis), &self.views.rotations[1]);
@@ -358,21 +359,21 @@ impl Rectification {
         &self.views.cameras
     }
 
-    /// The rotations from the frame of each camera to that of its rectified view.
+    /// The rotations from each camera to its rectified view.
     #[must_use]
     pub fn rotations(&self) -> &[Matrix; 2] {
         &self.views.rotations
     }
 }
 
-/// Views whose epipolar lines are columns, turned so that they are rows and the right view is to the right; and their size.
-fn turned(views: Views, (width, height): (usize, usize)) -> (Views, (usize, usize)) {
+/// Rotates vertical views so that epipolar lines are rows and the right view is to the right; with their size.
+fn turned(views: RectifiedViews, (width, height): (usize, usize)) -> (RectifiedViews, (usize, usize)) {
     if !views.is_vertical() {
         return (views, (width, height));
     }
     let (right, bottom) = (width as f64 - 1.0, height as f64 - 1.0);
-    let Views { rotations, cameras, translation: [_, down], size } = views;
-    // The left camera is above the right one where it is up in the frame of the right view.
+    let RectifiedViews { rotations, cameras, translation: [_, down], size } = views;
+    // The left camera is above the right one if it is up in the frame of the right view.
     let above = down < 0.0;
     let turn: Matrix = if above {
         [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
@@ -385,5 +386,5 @@ fn turned(views: Views, (width, height): (usize, usize)) -> (Views, (usize, usiz
     });
     let rotations = rotations.map(|rotation| product(&turn, &rotation));
     let size = size.map(|(width, height)| (height, width));
-    (Views { rotations, cameras, translation: [-down.abs(), 0.0], size }, (height, width))
+    (RectifiedViews { rotations, cameras, translation: [-down.abs(), 0.0], size }, (height, width))
 }

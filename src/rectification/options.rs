@@ -1,14 +1,14 @@
-//! What a user may choose of a rectification.
+//! Options of a rectification.
 
 use crate::error::{Error, Result};
 
-/// What a user may choose of a rectification. The default is that of OpenCV's `stereoRectify`.
+/// Options of a rectification. The defaults are those of OpenCV's `stereoRectify`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// From 0, where every pixel of the rectified views has a source, to 1, where no pixel of the images is lost. `None` keeps
-    /// the focal length; for fisheyes it is 0. With a number, a rectification that the calibration holds is not used.
+    /// From 0, where every pixel of the rectified views has a source, to 1, where no pixel of the images is lost. `None`
+    /// keeps the focal length; for fisheyes it means 0. A number overrides a rectification that the calibration holds.
     pub alpha: Option<f64>,
-    /// Whether both views have the same principal point, so that what is infinitely far has a disparity of 0.
+    /// Whether both views share a principal point, so that points at infinity have a disparity of 0.
     pub zero_disparity: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Images at other places: cubic interpolation in integers.
+//! Resamples images by cubic interpolation in integers.
 
 use crate::error::Result;
 use crate::image::cubic::{BITS, STEPS, WEIGHTS};
@@ -7,23 +7,23 @@ use crate::memory;
 use crate::threads;
 use crate::threads::prelude::*;
 
-/// A place in an image: x and y, in 1/[`STEPS`] px.
+/// A position in an image: x and y, in 1/[`STEPS`] px.
 pub(super) type Place = [i32; 2];
 
-/// What stands for no place: outside of every image.
+/// A position outside every image.
 pub(super) const NOWHERE: Place = [i32::MIN; 2];
 
-/// The nearest place to x and y.
+/// The nearest position to x and y.
 pub(super) fn place(at: [f64; 2]) -> Place {
-    // What is not finite or far away ends up outside, too.
+    // Values that are not finite or far away end up outside too.
     at.map(|v| (v * STEPS as f64 + 0.5).floor() as i32)
 }
 
-/// `image` at the places that `source` says for each pixel of an image of `size`. A pixel is masked where its value takes one that is
-/// masked or outside. With `bytes`, values are whole 8-bit levels.
+/// Samples `image` at the positions that `source` gives for each pixel of an image of `size`. A pixel is masked
+/// if a masked or outside pixel contributes to it. With `bytes`, values are rounded to whole 8-bit levels.
 ///
 /// # Errors
-/// [`Error::Memory`](crate::Error::Memory) when the system has not enough memory.
+/// [`Error::Memory`](crate::Error::Memory) when the system has too little memory.
 pub(super) fn resample(
     image: &Image,
     (width, height): (usize, usize),
@@ -45,7 +45,7 @@ pub(super) fn resample(
     Ok(Image { pixels: Plane::new(width, height, pixels), masked: Plane::new(width, height, masked) })
 }
 
-/// The colours of a row, those that there are, and which pixels are masked.
+/// Samples the colours of a row, and unmasks the pixels that have one.
 #[pulp::with_simd(sample_row = crate::vectors::widest())]
 #[inline(always)]
 fn sample_row_on<'a, S: pulp::Simd, F: Fn(usize) -> Place>(
@@ -62,12 +62,12 @@ fn sample_row_on<'a, S: pulp::Simd, F: Fn(usize) -> Place>(
     }
 }
 
-/// Values from colours. With `bytes`, they are whole 8-bit levels.
+/// Rounds colours to values. With `bytes`, they are whole 8-bit levels.
 #[pulp::with_simd(round_row = crate::vectors::widest())]
 #[inline(always)]
 fn round_row_on<'a, S: pulp::Simd>(_: S, colours: &'a [f64], bytes: bool, out: &'a mut [u16]) {
     const ONE: f64 = (1u64 << (2 * BITS)) as f64;
-    // Whole numbers become the lower bits of such a sum.
+    // A whole number ends up in the lower bits of such a sum.
     const WHOLE: f64 = (1u64 << 52) as f64;
     for (out, colour) in out.iter_mut().zip(colours) {
         let level = ((colour + 0.5 * ONE) * (1.0 / ONE)).floor().max(0.0).min(f64::from(u16::MAX));
@@ -85,7 +85,7 @@ fn grey_row_on<S: pulp::Simd>(_: S, pixels: &mut [Pixel]) {
     }
 }
 
-/// Red, green, blue and something that is not used, times 2^28: whole numbers, which doubles hold up to 2^53.
+/// Red, green, blue and an unused value, times 2^28: integers, which doubles represent exactly up to 2^53.
 type Colour = [f64; 4];
 
 /// The colour at `at`.
@@ -99,7 +99,7 @@ fn sample(image: &Image, any_masked: bool, at: Place) -> Option<Colour> {
         .or_else(|| sample_anywhere(image, [x, y], across, down))
 }
 
-/// The colour around the pixel (x, y), by weights along the row and the column.
+/// The colour around the pixel (x, y), by weights along row and column.
 fn sample_anywhere(image: &Image, [x, y]: [i64; 2], across: &[i32; 4], down: &[i32; 4]) -> Option<Colour> {
     let (width, height) = image.pixels.size();
     let mut sum = Colour::default();
@@ -120,7 +120,7 @@ fn sample_anywhere(image: &Image, [x, y]: [i64; 2], across: &[i32; 4], down: &[i
     Some(sum)
 }
 
-/// The same where all sixteen pixels around (x, y) are in the image and none of them is masked: that is nearly everywhere, and quicker.
+/// The same, if all sixteen pixels around (x, y) are inside the image and unmasked: the usual and faster case.
 #[inline(always)]
 fn sample_inside(
     image: &Image,
@@ -138,7 +138,7 @@ fn sample_inside(
         if any_masked && image.masked.row(y)[x..x + 4].contains(&true) {
             return None;
         }
-        // Weights have 14 bits and sum to less than 1.5: a row fits in 32 bits.
+        // Weights have 14 bits and sum to less than 1.5, so a row fits in 32 bits.
         let mut row = [0; 4];
         for (pixel, across) in pixels.iter().zip(across) {
             for (row, value) in row.iter_mut().zip(pixel) {
@@ -174,9 +174,9 @@ mod tests {
         assert!(moved.masked[(17, 5)] && !moved.masked[(16, 5)]);
     }
 
-    /// Where all pixels are there, the quick way gives what the other does, and elsewhere nothing.
+    /// The fast path agrees with the other one wherever it applies.
     #[test]
-    fn both_ways_agree() {
+    fn the_fast_path_agrees_with_the_general_one() {
         let mut image = noise(24, 17);
         image.masked[(11, 8)] = true;
         let mut quick = 0;
@@ -208,13 +208,13 @@ mod tests {
         let moved =
             resample(&image, (30, 30), false, |x, y| place([x as f64 + 0.25, y as f64 - 0.5])).unwrap();
         assert_eq!(moved.pixels[(10, 10)], [value(10, 10) + 150 - 50; 4]);
-        // What takes a pixel outside is masked: three columns and rows are read beyond whole pixels.
+        // A pixel that needs one outside is masked: three columns and rows are read beyond whole pixels.
         assert!(moved.masked[(28, 10)] && !moved.masked[(27, 10)] && moved.masked[(0, 10)]);
         assert!(moved.masked[(10, 1)] && !moved.masked[(10, 2)]);
     }
 
     #[test]
-    fn what_takes_a_masked_pixel_is_masked() {
+    fn pixels_that_need_a_masked_one_are_masked() {
         let mut image = noise(12, 12);
         image.masked[(6, 6)] = true;
         let masked = |dx: f64| {
@@ -225,7 +225,7 @@ mod tests {
         assert_eq!(masked(0.5), [0, 4, 5, 6, 7, 10, 11]);
         assert_eq!(sample(&image, true, NOWHERE), None);
         for nowhere in [[f64::NAN, 3.0], [f64::INFINITY, 3.0], [3.0, -1e300], [1e18, 1e18]] {
-            // NaN becomes 0, which is in the image; the lens never gives it.
+            // NaN becomes 0, which is inside the image; lenses never give NaN.
             let at = sample(&image, true, place(nowhere));
             assert!(nowhere[0].is_nan() || at.is_none(), "{nowhere:?}");
         }

@@ -1,23 +1,23 @@
-//! How far a rectification by matches alone can be trusted.
+//! How reliable a rectification by matches alone is.
 
 use std::fmt;
 
 use super::doubts::Doubt;
 
-/// How far a rectification can be trusted that comes from matches alone. It displays as one line.
+/// How reliable a rectification from matches alone is. It displays as one line.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Trust {
     /// Number of matches.
     pub matches: usize,
-    /// How many of them agree: after rectification they are on the same row, up to 1.5 px or 1/800 of the image's longer side.
+    /// Matches that agree: after rectification they are on the same row, up to 1.5 px or 1/800 of the image's longer side.
     pub agreeing: usize,
-    /// How far apart the rows of those that agree are in the median, in pixels of the rectified views.
+    /// Median row distance of the agreeing matches, in pixels of the rectified views.
     pub median: f64,
-    /// The same of the 95th percentile.
+    /// The 95th percentile of that distance.
     pub percentile95: f64,
-    /// The share of 8 x 8 parts of the left image that have a match that agrees, from 0 to 1.
+    /// The share of 8 x 8 parts of the left image with an agreeing match, from 0 to 1.
     pub coverage: f64,
-    /// The share of the matches that agree and that no single plane explains, from 0 to 1.
+    /// The share of agreeing matches that no single plane explains, from 0 to 1.
     pub off_one_plane: f64,
 }
 
@@ -36,7 +36,7 @@ impl fmt::Display for Trust {
 }
 
 impl Trust {
-    /// What makes a rectification doubtful that was not refused.
+    /// The doubts about a rectification that was not refused.
     pub(super) fn doubts(&self, tolerance: f64) -> Vec<Doubt> {
         const AGREEING: f64 = 0.7;
         const COVERAGE: f64 = 0.4;

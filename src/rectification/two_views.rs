@@ -1,12 +1,12 @@
-//! How the two views of one camera stood to each other, from matches alone.
+//! Estimates the relative pose of two views of one camera from matches alone.
 //!
-//! Both views are pinholes of one unknown focal length, with the principal point in the middle: Fusiello and Irsara, *Quasi-Euclidean
-//! Uncalibrated Rectification of Images* (2008). What they stand like is found by random samples (RANSAC, Fischler and Bolles 1981,
-//! with the truncated error of Torr and Zisserman's MSAC, 2000), and then by least squares of Sampson's distance over all matches, each
-//! weighted as by Geman and `McClure`.
+//! Both views are pinholes of one unknown focal length, with the principal point in the middle: Fusiello and
+//! Irsara, *Quasi-Euclidean Uncalibrated Rectification of Images* (2008). The pose is estimated from random
+//! samples (RANSAC, Fischler and Bolles 1981, with the truncated error of Torr and Zisserman's MSAC, 2000),
+//! and then by least squares of Sampson's distance over all matches, weighted as by Geman and `McClure`.
 //!
-//! The samples are the same in every run, sums are in a fixed order, and only + - * / and square roots and `libm` are used: the same
-//! bits on every machine, with any number of threads.
+//! The samples are the same in every run, sums have a fixed order, and only + - * /, square roots and `libm`
+//! are used: the same bits on every machine, with any number of threads.
 
 use super::least_squares::solved;
 use crate::calibration::cameras::Pose;
@@ -18,30 +18,30 @@ use crate::error::Result;
 use crate::threads;
 use crate::threads::prelude::*;
 
-/// A point of the scene in both images: x and y in the left one and in the right one, in pixels.
+/// A point of the scene in both images: x and y in the left and in the right image, in pixels.
 pub type Correspondence = [[f64; 2]; 2];
 
 /// Number of random samples from each start.
 const SAMPLES: u64 = 400;
-/// Matches of a sample: one more than the geometry has unknowns, where the focal length is that of the start.
+/// Matches per sample: one more than the unknowns of the geometry with a fixed focal length.
 const SAMPLE: usize = 6;
-/// Steps of least squares on a sample, and on all matches.
+/// Iterations of least squares on a sample, and on all matches.
 const STEPS: [usize; 2] = [6, 30];
-/// The focal length that is assumed at the start, in longer sides of the image (open). Phones have .7 to .8, other cameras up to 1.5.
+/// The initial focal length, in longer sides of the image (open). Phones have .7 to .8, other cameras up to 1.5.
 const FOCAL_LENGTH: f64 = 1.0;
-/// What is unusual costs as much as if each match were so far off, in tolerances (open). Matches say little of the focal length, and of
-/// turns of both views about an axis across the way, where disparities are nearly the same or a lens bends lines; of all else they say
-/// so much that this does not count.
+/// The prior costs as much as a row distance of this many tolerances in each match (open). Matches determine
+/// the focal length, and rotations of both views about an axis across the motion, poorly if disparities are
+/// nearly the same or a lens bends lines. They determine everything else so well that the prior does not count.
 const COST: f64 = 0.1;
-/// So unusual are a focal length of e times that assumed, a turn by so many radians, and a way that goes so far forward of 1 (open).
+/// Standard deviations of the priors: log of the focal length, rotation in radians, forward motion (open).
 const UNUSUAL: [f64; 3] = [1.0, 0.1, 0.2];
 
 /// Two views of one camera.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TwoViews {
-    /// From the frame of the left view to that of the right one.
+    /// The rotation from the left view to the right one.
     rotation: Matrix,
-    /// Where the left view is in the frame of the right one: a unit vector.
+    /// The position of the left view in the frame of the right one: a unit vector.
     direction: [f64; 3],
     /// In pixels.
     focal_length: f64,
@@ -52,21 +52,21 @@ pub(super) struct TwoViews {
 const UNKNOWNS: usize = 6;
 
 impl TwoViews {
-    /// Distance of a match from its epipolar line, in pixels, up to which it agrees: what matches in images of this size are exact to,
-    /// and what the lens of a phone distorts.
+    /// Largest distance of an agreeing match from its epipolar line, in pixels: the accuracy of matches in
+    /// images of this size, and the distortion of a phone's lens.
     pub(super) fn tolerance((width, height): (usize, usize)) -> f64 {
         const LEAST: f64 = 1.5;
         const PARTS: f64 = 800.0;
         (width.max(height) as f64 / PARTS).max(LEAST)
     }
 
-    /// How the views of `size` stand by most of the `matches`; `None` of fewer than a sample.
-    pub(super) fn of(matches: &[Correspondence], size: (usize, usize)) -> Option<Self> {
+    /// The geometry of views of `size` that most `matches` support; `None` of fewer than a sample.
+    pub(super) fn estimate(matches: &[Correspondence], size: (usize, usize)) -> Option<Self> {
         if matches.len() < SAMPLE {
             return None;
         }
         let tolerance = Self::tolerance(size);
-        // To the side, one above the other, and forward, which is no pair, but must not pass for one.
+        // Start from sideways, vertical and forward motion; the last is detected as no stereo pair.
         let starts = [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
         let sampled = |i: u64| {
             let few = sample(matches.len(), i % SAMPLES).map(|i| matches[i]);
@@ -80,12 +80,12 @@ impl TwoViews {
             (all, errors)
         });
         let best = errors.iter().zip(&all).min_by(|a, b| a.0.total_cmp(b.0))?.1;
-        // Twice, because the matches that agree with a sample are not yet all.
+        // Fit twice, because not all agreeing matches are found with the first sample.
         let found = best.fitted(matches, STEPS[1], Some(tolerance));
         Some(found.fitted(matches, STEPS[1], Some(tolerance / 2.0)))
     }
 
-    /// What is assumed before any match is known: a step to the right, without a turn.
+    /// The initial geometry: a step to the right, without rotation.
     pub(super) fn start(size: (usize, usize)) -> Self {
         Self { rotation: IDENTITY, direction: [-1.0, 0.0, 0.0], focal_length: Self::assumed(size), size }
     }
@@ -110,13 +110,13 @@ impl TwoViews {
         Lens::new([self.focal_length; 2], self.principal_point(), Distortion::NONE)
     }
 
-    /// E: the rays p and q of a match have q E p = 0.
+    /// E: the rays p and q of a match satisfy q E p = 0.
     fn essential(&self) -> Matrix {
         let [x, y, z] = self.direction;
         product(&[[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]], &self.rotation)
     }
 
-    /// How far apart the rows of a match are after rectification, about: Sampson's distance, of both points together, in pixels.
+    /// Sampson's distance over both points, in pixels: about the row distance of a match after rectification.
     pub(super) fn distance(&self, of: &Correspondence) -> f64 {
         self.distance_by(&self.essential(), of)
     }
@@ -129,7 +129,7 @@ impl TwoViews {
         if norm > 0.0 { self.focal_length * dot(q, in_right) / norm.sqrt() } else { 0.0 }
     }
 
-    /// The sum of the squared distances of `matches`, each as if it were at most `tolerance`.
+    /// The sum of the squared distances of `matches`, each limited to `tolerance`.
     fn truncated_error(&self, matches: &[Correspondence], tolerance: f64) -> f64 {
         let essential = self.essential();
         let most = tolerance * tolerance;
@@ -144,7 +144,7 @@ impl TwoViews {
             .sum()
     }
 
-    /// How unusual the views are: the focal length, the turn about each axis, and the way forward.
+    /// Deviations from the prior: the focal length, the rotation about each axis, and the forward motion.
     fn unusual(&self) -> [f64; 5] {
         let [focal_length, turn, forward] = UNUSUAL;
         let by = rotation_vector(&self.rotation);
@@ -153,10 +153,10 @@ impl TwoViews {
         [zoom / focal_length, by[0] / turn, by[1] / turn, by[2] / turn, z / forward]
     }
 
-    /// The views after a small change of each unknown.
+    /// The views after a small change of the unknowns.
     fn moved(&self, by: [f64; UNKNOWNS]) -> Self {
         let [x, y, z, a, b, zoom] = by;
-        // Two directions across that in which the left view is.
+        // Two directions perpendicular to the direction of the left view.
         let smallest = (0..3).min_by(|&i, &j| self.direction[i].abs().total_cmp(&self.direction[j].abs()));
         let across = cross(self.direction, IDENTITY[smallest.unwrap_or(0)]);
         let across = scaled(across, 1.0 / length(across));
@@ -170,11 +170,11 @@ impl TwoViews {
         }
     }
 
-    /// The views nearest to these that bring the rows of `matches` together, by the steps of Levenberg and Marquardt. With a `scale`, in
-    /// pixels, matches that are farther off count less and less, and the focal length changes too; without one it stays.
+    /// Refines the views to bring the rows of `matches` together, by Levenberg and Marquardt. With a `scale`, in
+    /// pixels, matches that are farther off count less, and the focal length changes too; without one it is fixed.
     fn fitted(self, matches: &[Correspondence], steps: usize, scale: Option<f64>) -> Self {
         const STEP: f64 = 1e-6;
-        // Of all that is unusual together.
+        // The weight of the prior.
         let each = scale.map_or(0.0, |scale| COST * scale * COST * scale * matches.len() as f64);
         let cost = |views: &Self| {
             let essential = views.essential();
@@ -238,9 +238,9 @@ impl TwoViews {
         views
     }
 
-    /// How the right view stands to the left one, with a baseline of 1. Matches do not say on which side it is where the angle between
-    /// the views is not known well: it is to the right, as the user says. Where one view is above the other, most matches decide, which
-    /// must lie in front of both.
+    /// The pose of the right view relative to the left one, with a baseline of 1. Matches determine its sign
+    /// poorly if the angle between the views is uncertain: the right view is to the right, as the user says.
+    /// If one view is above the other, most matches must be in front of both.
     pub(super) fn pose(&self, matches: &[Correspondence]) -> Pose {
         let half = rotation(scaled(rotation_vector(&self.rotation), -0.5));
         let [x, y, _] = rotated(&half, self.direction);
@@ -252,7 +252,7 @@ impl TwoViews {
     /// Whether most matches are behind a view.
     fn votes_behind(&self, matches: &[Correspondence]) -> bool {
         let behind = matches.iter().filter(|[left, right]| {
-            // a p + t = b q, with p turned into the frame of the right view.
+            // a p + t = b q, with p rotated into the frame of the right view.
             let (p, q) = (rotated(&self.rotation, self.ray(*left)), self.ray(*right));
             let normal = cross(q, p);
             dot(cross(q, self.direction), normal) > 0.0
@@ -260,8 +260,8 @@ impl TwoViews {
         2 * behind.count() > matches.len()
     }
 
-    /// Whether the camera moved forward or backward: an image shows where the other one was taken from, or the way is more forward than to
-    /// a side.
+    /// Whether the camera moved forward or backward: an image shows the position of the other one, or the
+    /// motion is more forward than sideways.
     pub(super) fn is_forward(&self) -> bool {
         let half = rotation(scaled(rotation_vector(&self.rotation), -0.5));
         let [x, y, z] = rotated(&half, self.direction).map(f64::abs);
@@ -271,8 +271,8 @@ impl TwoViews {
         z > x.max(y) || shown(self.direction) || shown(other)
     }
 
-    /// The share of `matches` that no one plane explains, nor a mere turn of the camera: what is farther than the tolerance from where the
-    /// homography of most of them has it.
+    /// The share of `matches` that neither one plane nor a mere rotation of the camera explains: those
+    /// farther than the tolerance from the homography of most.
     pub(super) fn share_off_one_plane(&self, matches: &[Correspondence]) -> f64 {
         const ROUNDS: usize = 20;
         let tolerance = Self::tolerance(self.size);
@@ -307,7 +307,7 @@ impl TwoViews {
     }
 }
 
-/// Some of `count` indices, all different.
+/// Distinct random indices below `count`.
 fn sample(count: usize, seed: u64) -> [usize; SAMPLE] {
     // The generator SplitMix64.
     let mut state = seed.wrapping_mul(0xd1b5_4a32_d192_ed03);

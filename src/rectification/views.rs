@@ -1,6 +1,6 @@
-//! The choice of the rectified views: Bouguet's method, as OpenCV has it.
+//! Chooses the rectified views by Bouguet's method, like OpenCV.
 
-use crate::calibration::cameras::{Pose, Views};
+use crate::calibration::cameras::{Pose, RectifiedViews};
 use crate::calibration::lens::Lens;
 use crate::calibration::matrix::{
     Matrix, cross, length, product, rotated, rotation, rotation_vector, scaled, transposed,
@@ -10,31 +10,31 @@ use crate::image::calib::Camera;
 
 use super::options::Options;
 
-/// The rectified views of two cameras with images of `size`. Both turn by half of the rotation between them, then together
-/// until the baseline is along the rows, or along the columns where it is nearer to those.
+/// The rectified views of two cameras with images of `size`. Each turns by half of the rotation between them,
+/// then both turn together until the baseline is along the rows, or along the columns if it is closer to those.
 ///
 /// # Errors
-/// [`Error::Calibration`] where no such views exist.
+/// [`Error::Calibration`] when no such views exist.
 pub(super) fn choose(
     lenses: &[Lens; 2],
     pose: &Pose,
     size: (usize, usize),
     options: &Options,
-) -> Result<Views> {
+) -> Result<RectifiedViews> {
     let error = |reason: &str| Err(Error::Calibration(reason.into()));
     let vector = rotation_vector(&pose.rotation);
     if length(vector) >= std::f64::consts::FRAC_PI_2 {
         return error(if pose.rotation[2][2] > 0.0 {
             "has one camera on its side or upside down against the other; turn its images, and calibrate with these"
         } else {
-            "has cameras that look in directions more than 90 degrees apart; no pair comes of them"
+            "has cameras that look in directions more than 90 degrees apart; they cannot be rectified"
         });
     }
     let half = rotation(scaled(vector, -0.5));
     let t = rotated(&half, pose.translation);
     let axis = usize::from(t[0].abs() <= t[1].abs());
     if t[2].abs() > t[axis].abs() {
-        return error("has one camera in front of the other; no rectified pair comes of them");
+        return error("has one camera in front of the other; they cannot be rectified");
     }
     let mut goal = [0.0; 3];
     goal[axis] = t[axis].signum();
@@ -71,10 +71,10 @@ pub(super) fn choose(
     }
     let mut translation = [0.0; 2];
     translation[axis] = t[axis];
-    Ok(Views { rotations, cameras, translation, size: None })
+    Ok(RectifiedViews { rotations, cameras, translation, size: None })
 }
 
-/// Lets both cameras share the principal point, or at least the coordinate across the epipolar lines.
+/// Averages the principal points, or at least the coordinate across the epipolar lines.
 fn share([left, right]: &mut [Camera; 2], axis: usize, zero_disparity: bool) {
     for i in 0..2 {
         if zero_disparity || i != axis {
@@ -84,14 +84,14 @@ fn share([left, right]: &mut [Camera; 2], axis: usize, zero_disparity: bool) {
     }
 }
 
-/// Where a pixel of a real camera is in the plane z = 1 of its rectified view.
+/// The point of a real camera's pixel in the plane z = 1 of its rectified view.
 pub(super) fn seen(lens: &Lens, rotation: &Matrix, pixel: [f64; 2]) -> [f64; 2] {
     let [x, y] = lens.nearly_undistorted(pixel);
     let [x, y, z] = rotated(rotation, [x, y, 1.0]);
     [x / z, y / z]
 }
 
-/// The cameras of lenses that are no fisheyes: the mean focal length, and the corners of the images around the centre.
+/// The cameras of ordinary lenses: the mean focal length, with the corners of the images around the centre.
 fn pinhole(lenses: &[Lens; 2], rotations: &[Matrix; 2], size: (usize, usize), axis: usize) -> [Camera; 2] {
     let [a, b] = lenses.each_ref().map(|lens| lens.focal_length[1 - axis]);
     let focal_length = (a + b) * 0.5;
@@ -105,8 +105,8 @@ fn pinhole(lenses: &[Lens; 2], rotations: &[Matrix; 2], size: (usize, usize), ax
     })
 }
 
-/// The factor of the focal length: 1 - `alpha` of that with which no pixel lacks a source, and `alpha` of that with which no
-/// source pixel is lost.
+/// The factor of the focal length: 1 - `alpha` of that at which every pixel has a source, plus `alpha` of
+/// that at which no source pixel is lost.
 fn scale(
     lenses: &[Lens; 2],
     rotations: &[Matrix; 2],
@@ -145,8 +145,8 @@ fn scale(
     all_known * (1.0 - alpha) + all_kept * alpha
 }
 
-/// The cameras of fisheyes and other wide lenses: from the middles of the edges of the images. `balance` is 0 where the nearest of them limits the
-/// view, and 1 where the farthest does.
+/// The cameras of fisheyes and other wide lenses, from the middles of the image edges. With a `balance` of 0
+/// the nearest edge limits the view, with 1 the farthest.
 fn fisheye(lenses: &[Lens; 2], rotations: &[Matrix; 2], size: (usize, usize), balance: f64) -> [Camera; 2] {
     let (width, height) = (size.0 as f64, size.1 as f64);
     let (middle, centre) = ((size.0 / 2) as f64, (size.1 / 2) as f64);

@@ -1,4 +1,4 @@
-//! Two hundred files that are no calibrations of a pair. Each is refused by what `match` and `rectify` read calibrations with.
+//! Two hundred files that are no calibration of a pair. The reader of `match` and `rectify` refuses each.
 
 use super::forms::{
     METASHAPE, MIDDLEBURY, NAMES, driving_stereo, entry, kalibr, lens, mrcal, npz, opencv, ost, ros, zed,
@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
 
-/// Name and bytes of a file, and what the line must say.
+/// Name and bytes of a file, and the expected words of the error.
 struct File {
     name: String,
     bytes: Vec<u8>,
@@ -36,7 +36,7 @@ fn at(offset: usize, magic: &[u8]) -> Vec<u8> {
     [&vec![b'a'; offset], magic, b"\0\x01\x02\x03 more \xff\xfe"].concat()
 }
 
-/// Files of bytes: where the mark of their kind stands, the mark, and the words.
+/// Binary files: the offset of the signature, the signature, and the expected words.
 fn binaries() -> Vec<File> {
     let kinds: &[(&str, usize, &[u8], &str)] = &[
         ("a.png", 0, b"\x89PNG\r\n\x1a\n", "a PNG image & no calibration"),
@@ -133,7 +133,7 @@ fn binaries() -> Vec<File> {
     all
 }
 
-/// Texts of other purposes.
+/// Texts for other purposes.
 fn texts() -> Vec<File> {
     let rows: &[(&str, &str)] = &[
         ("README.md", "# Stereo\n\nNote: this is `K1=5`.\n\n* one\n* two\n"),
@@ -272,7 +272,7 @@ fn texts() -> Vec<File> {
     all
 }
 
-/// Calibrations of one camera, damaged ones, and such as contradict themselves.
+/// Calibrations of one camera, damaged ones, and contradictory ones.
 fn damaged() -> Vec<File> {
     let (cv, chain) = (
         opencv(NAMES),
@@ -397,7 +397,7 @@ fn damaged() -> Vec<File> {
             "is no calibration of a known form",
         ),
     ];
-    // What is cut off in the middle of a matrix.
+    // Files that are cut off in the middle of a matrix.
     for (form, text, words) in [
         ("opencv.yml", cv.clone(), "is no YAML"),
         ("chain.yaml", chain.clone(), "is no YAML"),
@@ -422,7 +422,7 @@ fn damaged() -> Vec<File> {
     all
 }
 
-/// Formats that a line may speak of where the name or the beginning of the file says that it is of that.
+/// A format that the error mentions although neither name nor start of the file suggests it.
 fn speaks_of_another(file: &File, told: &str) -> Option<&'static str> {
     let text = String::from_utf8_lossy(&file.bytes);
     let start = text.trim_start_matches('\u{feff}').trim_start();
@@ -457,9 +457,9 @@ fn files_that_are_no_calibrations_are_refused() {
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), all.len(), wrong.join("\n"));
 }
 
-/// Control: what the damaged ones were made of is read, and so is what looks odd and is right.
+/// Control: the intact originals of the damaged files are read, and so are odd but valid ones.
 #[test]
-fn calibrations_beside_those_are_read() {
+fn intact_and_odd_calibrations_are_read() {
     let cv = opencv(NAMES);
     let chain = kalibr(
         "radtan",
@@ -494,12 +494,11 @@ fn calibrations_beside_those_are_read() {
     }
 }
 
-/// Names and texts of files, the one that the line names, and its words.
+/// Names and texts of files, the file that the error names, and its words.
 type TooMany<'a> = (&'a [(&'a str, &'a str)], &'a str, &'a str);
 
-/// A file that is not needed.
 #[test]
-fn a_file_too_many_is_told() {
+fn superfluous_files_are_named() {
     let (cv, other) = (opencv(NAMES), opencv(["cameraMatrix1", "D1", "K2", "D2", "R", "T"]));
     let pose = cv.split("R: ").nth(1).map(|rest| format!("R: {rest}")).unwrap();
     let lenses = cv.split("R: ").next().unwrap().to_owned();
@@ -558,7 +557,7 @@ fn a_file_too_many_is_told() {
         let told = read(files).unwrap_err();
         assert!(says(&told, name, words), "{name}: {told}");
     }
-    // Control: what belongs together.
+    // Control: files that belong together.
     assert!(read(&[("lenses.yml", &lenses), ("pose.yml", &pose)]).is_ok());
     let (paths, folder) = (vec![std::env::temp_dir()], "is a folder; give the calibration that is in it");
     let told = calibration::read(&paths).unwrap_err().to_string();

@@ -1,12 +1,12 @@
-//! The forms of public programs and data sets, with numbers of their own: a focal length of 500 and a baseline of 0.12 m.
+//! The forms of public programs and data sets, with our own numbers: a focal length of 500 and a baseline of 0.12 m.
 
 use super::*;
 
-/// What becomes of a form.
+/// The expected outcome of a form.
 enum Fate {
-    /// It is read: the baseline in its unit, and whether it has lenses.
+    /// It is read, with this baseline in its unit.
     Read(f64),
-    /// It is refused in a line with these words.
+    /// It is refused with an error that has these words.
     Told(&'static str),
 }
 
@@ -30,7 +30,7 @@ pub(super) fn matrix(name: &str, rows: usize, data: &str) -> String {
     format!("{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {data} ]\n")
 }
 
-/// A calibration in YAML, with these names of K, D of each camera, R and T.
+/// A calibration in YAML, with these names of K and D of each camera, R and T.
 pub(super) fn opencv(names: [&str; 6]) -> String {
     let [k1, d1, k2, d2, r, t] = names;
     [
@@ -100,7 +100,7 @@ pub(super) fn ost(side: &str, tx: &str) -> String {
     )
 }
 
-/// A chain, with what says the pose of each camera.
+/// A chain of cameras, with the given pose entries.
 pub(super) fn kalibr(model: &str, poses: [&str; 2]) -> String {
     let camera = |i: usize| {
         format!(
@@ -124,7 +124,7 @@ fn euroc(rows: &str, kind: &str) -> String {
     )
 }
 
-/// To the body from the right camera.
+/// The inverse pose, from the right camera to the body.
 fn back() -> String {
     RIGHT.replace("-0.12", "0.12")
 }
@@ -196,7 +196,7 @@ fn depthai() -> String {
     )
 }
 
-/// Sections of a lens for one size, and what stands behind.
+/// Sections of the lenses for one size, followed by `more`.
 pub(super) fn zed(size: &str, coefficients: &str, more: &str) -> String {
     let lens =
         |side: &str| format!("[{side}_CAM_{size}]\nfx = 500\nfy = 500\ncx = 320\ncy = 240\n{coefficients}\n");
@@ -247,7 +247,7 @@ fn maplab(pose: &str, rows: &str) -> String {
     format!("cameras:\n{}{}label: rig\n", camera(PLACE), camera(rows))
 }
 
-/// An archive of numpy: arrays with their names and shapes, without compression.
+/// An archive of NumPy: arrays with their names and shapes, uncompressed.
 pub(super) fn npz(arrays: &[(&str, &str, Vec<f64>)]) -> Vec<u8> {
     let (mut bytes, mut table) = (Vec::new(), Vec::new());
     for (name, shape, numbers) in arrays {
@@ -258,7 +258,7 @@ pub(super) fn npz(arrays: &[(&str, &str, Vec<f64>)]) -> Vec<u8> {
             .concat();
         let name = format!("{name}.npy");
         let (size, length) = ((data.len() as u32).to_le_bytes(), (name.len() as u16).to_le_bytes());
-        // Version, flags, method, time, date, checksum, both sizes, lengths of the name and of what numpy adds.
+        // Version, flags, method, time, date, checksum, both sizes, lengths of the name and the extra field.
         let common = [&[20, 0, 0, 0, 0, 0, 0, 0, 33, 0, 0, 0, 0, 0][..], &size, &size, &length].concat();
         let at = (bytes.len() as u32).to_le_bytes();
         bytes.extend([b"PK\x03\x04", &common[..], &[4, 0], name.as_bytes(), &[0; 4], &data].concat());
@@ -294,10 +294,10 @@ fn texts(files: Vec<(&'static str, String)>) -> Vec<(&'static str, Vec<u8>)> {
     files.into_iter().map(|(name, text)| (name, text.into_bytes())).collect()
 }
 
-/// A form, its files, and what becomes of it.
+/// A form, its files, and the expected outcome.
 type Row = (&'static str, Vec<(&'static str, Vec<u8>)>, Fate);
 
-/// Those of OpenCV, and of what is written by its names.
+/// OpenCV's forms, and others with its names.
 fn of_opencv() -> Vec<Row> {
     let intrinsics = || opencv(["M1", "D1", "M2", "D2", "R", "T"]).split("R: ").next().unwrap().to_owned();
     let extrinsics = || {
@@ -434,7 +434,7 @@ fn of_opencv() -> Vec<Row> {
     ]
 }
 
-/// Those of robots.
+/// Forms of robots.
 fn of_robots() -> Vec<Row> {
     let stated = entry("T_cn_cnm1", RIGHT);
     let in_body = [entry("T_cam_imu", PLACE), entry("T_cam_imu", RIGHT)];
@@ -532,7 +532,7 @@ fn of_robots() -> Vec<Row> {
     ]
 }
 
-/// Those of cameras that are sold.
+/// Forms of commercial cameras.
 fn of_makers() -> Vec<Row> {
     let five = "k1 = -0.17\nk2 = 0.03\np1 = 0.0001\np2 = 0\nk3 = 0\n";
     let eight = "k1 = 1.5\nk2 = 2\np1 = 0.0001\np2 = 0\nk3 = 0.1\nk4 = 1.8\nk5 = 2\nk6 = 0.3\n";
@@ -579,7 +579,7 @@ fn of_makers() -> Vec<Row> {
     ]
 }
 
-/// Those of data sets.
+/// Forms of data sets.
 fn of_sets() -> Vec<Row> {
     vec![
         (
@@ -647,7 +647,7 @@ fn of_sets() -> Vec<Row> {
     ]
 }
 
-/// Those of photogrammetry.
+/// Forms of photogrammetry.
 fn of_photogrammetry() -> Vec<Row> {
     vec![
         ("COLMAP", texts(colmap("OPENCV 640 480 500 500 320.5 240.5 0 0 0 0")), Read(0.12)),
@@ -755,7 +755,7 @@ fn of_photogrammetry() -> Vec<Row> {
     ]
 }
 
-/// The focal length of the left camera, and the baseline, by all that says them.
+/// The focal length of the left camera and the baseline, from each source in the calibration.
 fn said(calibration: &StereoCalibration) -> Vec<(f64, f64)> {
     let length = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
     let pose = calibration.pose.zip(calibration.lenses);
@@ -766,7 +766,7 @@ fn said(calibration: &StereoCalibration) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn public_forms_are_read_or_named() {
+fn public_forms_are_read_or_recognized() {
     let all = [of_opencv(), of_robots(), of_makers(), of_sets(), of_photogrammetry()].concat_rows();
     let (mut read_ones, mut named) = (0, 0);
     for (name, files, fate) in &all {
@@ -795,7 +795,7 @@ fn public_forms_are_read_or_named() {
     assert!(read_ones >= 40 && read_ones + named >= 60, "{read_ones} and {named}");
 }
 
-/// Joins tables, whose rows cannot be copied.
+/// Concatenates tables, whose rows cannot be copied.
 trait ConcatRows {
     fn concat_rows(self) -> Vec<Row>;
 }
@@ -806,15 +806,15 @@ impl<const N: usize> ConcatRows for [Vec<Row>; N] {
     }
 }
 
-/// What stands beside the size of images in a file of a ZED.
+/// Distortion in ZED's sections of a size, and in those for all sizes.
 #[test]
-fn the_lenses_of_a_zed_are_those_of_all_sizes() {
+fn zed_lenses_may_be_common_to_all_sizes() {
     use mrfgs::calibration::lens::Distortion;
     let lens = |text: String| read(&[("SN1.conf", text)]).unwrap().lenses.unwrap()[1].distortion();
     let five = "k1 = -0.2\nk2 = 0.03\np1 = 0.001\np2 = 0\nk3 = 0\n";
     let inline = lens(zed("SVGA", five, ""));
     assert_eq!(lens(zed("SVGA", "", &disto(five))), inline);
-    // Where both are there, the section of all sizes has the newer model.
+    // If both are present, the section of all sizes has the newer model.
     assert_eq!(lens(zed("SVGA", "k1 = 7\n", &disto(five))), inline);
     assert_ne!(lens(zed("SVGA", "", "")), inline);
     let fisheye = lens(zed(
@@ -823,7 +823,7 @@ fn the_lenses_of_a_zed_are_those_of_all_sizes() {
         &disto("k1 = 0.1\nk2 = 0.2\nk3 = 0.3\nk4 = 0.4\nk5 = 0\nk6 = 0\np1 = 0\np2 = 0\n"),
     ));
     assert_eq!(fisheye, Distortion::Equidistant([0.1, 0.2, 0.3, 0.4]));
-    // T of OpenCV has the signs of TY and TZ, and not that of the baseline.
+    // OpenCV's T has the signs of TY and TZ, and the opposite of the baseline's.
     let moved = zed("SVGA", five, "").replace("TY = 0", "TY = 1.5").replace("TZ = 0", "TZ = -2.5");
     let pose = read(&[("SN1.conf", moved)]).unwrap().pose.unwrap();
     assert!(pose.translation.iter().zip([-120.0, 1.5, -2.5]).all(|(a, b)| (a - b).abs() < 1e-12), "{pose:?}");
@@ -832,16 +832,15 @@ fn the_lenses_of_a_zed_are_those_of_all_sizes() {
     assert!(says(&told, "SN1.conf", "no lenses of a pair & 4K, QHDPLUS, 2K"), "{told}");
 }
 
-/// What a chain says twice.
 #[test]
-fn a_chain_that_contradicts_itself_is_told() {
+fn a_contradictory_chain_is_refused() {
     let chain = |stated: &str| {
         let poses = [entry("T_cam_imu", PLACE), entry("T_cam_imu", RIGHT) + &entry("T_cn_cnm1", stated)];
         read(&[("chain.yaml", kalibr("radtan", [&poses[0], &poses[1]]))])
             .map(|found| found.pose.unwrap().translation[0])
     };
     assert_eq!(chain(RIGHT), Ok(-0.12));
-    // What the digits of a file leave open.
+    // A difference within rounding.
     assert_eq!(chain(&RIGHT.replace("-0.12", "-0.1203")), Ok(-0.1203));
     for (from, to, words) in [
         ("-0.12", "-0.2", "0.00 degrees and 0.0800 m"),

@@ -1,5 +1,5 @@
-//! Calibrations as users find them: what is none is refused in one line, and what public programs and data sets write is read, or named
-//! with what to do.
+//! Calibrations as users find them: files that are none are refused in one line, and those of public programs
+//! and data sets are read, or recognized with a remedy.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 #![allow(clippy::format_push_string, reason = "texts of many lines read best so")]
@@ -11,7 +11,7 @@ use mrfgs::calibration::{self, cameras::StereoCalibration};
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// What files of these names and contents are read as; the error as users see it.
+/// Reads files of these names and contents; the error is the text for users.
 fn read<T: AsRef<[u8]>>(files: &[(&str, T)]) -> Result<StereoCalibration, String> {
     let (_folder, paths) = written(files);
     calibration::read(&paths).map_err(|error| error.to_string())

@@ -7,8 +7,8 @@ use mrfgs::low_level::plan::Plan;
 use pollster::block_on;
 use std::fmt::Debug;
 
-/// Where `actual` first differs from `expected`, both \[y\]\[x\]\[slot\]\[label\] of `volume`, and how often
-/// they differ. Where the expected value is [`UNDEFINED`], any value will do.
+/// The first difference between `actual` and `expected`, both \[y\]\[x\]\[slot\]\[label\] of `volume`, and
+/// the number of differences. An expected [`UNDEFINED`] matches any value.
 pub fn compare(plan: &Plan, volume: Volume, actual: &[u32], expected: &[u32]) -> Result<(), String> {
     let (rows, labels, _) = volume_shape(plan, volume);
     let (level, slots) = match volume {
@@ -44,7 +44,7 @@ pub fn compare_finest(backend: &mut dyn Backend, expected: &Finest) -> Result<()
     Ok(())
 }
 
-/// Where two maps first differ, and how often.
+/// The first difference between two maps, and the number of differences.
 pub fn compare_maps<T: PartialEq + Debug>(
     name: &str,
     actual: &Plane<T>,

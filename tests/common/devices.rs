@@ -14,19 +14,19 @@ use std::io::Write;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// Devices that no test is using: opening a device and compiling its shaders takes longer than most tests.
+/// Idle devices, because opening a device and compiling its shaders takes longer than most tests.
 static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
 
-/// A separate GPU with injected faults. Where there is no driver it is `None`, reported on stderr, or a panic
-/// if `MRFGS_REQUIRE_GPU` is set and not 0.
+/// A separate GPU with injected faults. Without a driver it is `None`, which is reported on stderr, or a
+/// panic if `MRFGS_REQUIRE_GPU` is set and not 0.
 pub fn open(faults: FaultInjection) -> Option<Gpu> {
     match Gpu::with_faults(None, faults) {
         Ok(gpu) => Some(gpu),
         Err(e) => {
             let required = std::env::var("MRFGS_REQUIRE_GPU").is_ok_and(|v| v != "0" && !v.is_empty());
             assert!(!required, "MRFGS_REQUIRE_GPU is set and there is none: {e}");
-            // Bypasses the capture of the test harness: a test without its GPU must not look like a passed
-            // one.
+            // Bypasses the output capture of the test harness: a test without its GPU must not look like a
+            // passed one.
             let _ = writeln!(std::io::stderr(), "SKIPPED on the GPU: {e}");
             None
         }
@@ -39,7 +39,7 @@ pub fn gpu() -> Option<Pooled> {
     idle.or_else(|| open(FaultInjection::default())).map(|gpu| Pooled(Some(gpu)))
 }
 
-/// Name and a fresh instance of every backend.
+/// The name and a fresh instance of every backend.
 ///
 /// The twins are not a backend and never in this list: a backend compared with itself would always pass.
 pub fn backends() -> Vec<(String, Box<dyn Backend>)> {
@@ -50,7 +50,7 @@ pub fn backends() -> Vec<(String, Box<dyn Backend>)> {
     all
 }
 
-/// A device that returns to the idle ones when it is dropped.
+/// A device that returns to [`IDLE`] when it is dropped.
 pub struct Pooled(Option<Gpu>);
 
 impl Pooled {
@@ -61,7 +61,7 @@ impl Pooled {
 
 impl Drop for Pooled {
     fn drop(&mut self) {
-        // A test that panicked may have left it in any state.
+        // A panicking test may leave it in any state.
         if let Some(gpu) = self.0.take().filter(|_| !std::thread::panicking()) {
             IDLE.lock().unwrap_or_else(PoisonError::into_inner).push(gpu);
         }

@@ -3,7 +3,7 @@
 
 #![allow(dead_code, unreachable_pub, reason = "each test binary uses a part of it")]
 
-/// A PNG file whose header claims `size`; `rows` are its filtered rows, of all passes where it is interlaced.
+/// A PNG file whose header claims `size`; `rows` are its filtered rows, of all passes if it is interlaced.
 pub struct Png<'a> {
     pub size: (u32, u32),
     /// Bits per sample.

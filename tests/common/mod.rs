@@ -45,7 +45,7 @@ pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
     run(backend, &schedule::flood(plan, |_| Vec::new()))
 }
 
-/// The same on the costs that `backend` holds.
+/// The same as [`flood`], from the costs that `backend` holds.
 pub fn flood_on_costs(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
     run(backend, &schedule::flood(plan, schedule::join))
 }
@@ -69,7 +69,7 @@ fn run(backend: &mut dyn Backend, steps: &[Step]) -> mrfgs::Result<u32> {
     Ok(iterations)
 }
 
-/// Matches `pair` by `plan` in one piece, whatever memory that takes.
+/// Matches `pair` by `plan` in one piece, however much memory that takes.
 pub fn solve(
     backend: &mut dyn Backend,
     plan: &Plan,
@@ -79,7 +79,7 @@ pub fn solve(
     inspect(backend, plan, pair, observer, None)
 }
 
-/// The same, and `inspector` looks in.
+/// Like [`solve`], with an `inspector`.
 pub fn inspect(
     backend: &mut dyn Backend,
     plan: &Plan,

@@ -13,7 +13,7 @@ use mrfgs::options::{
 };
 use std::ops::Range;
 
-/// Random label windows for a level of `plan`: all labels, or some everywhere, or others from run to run.
+/// Random label windows for a level of `plan`: all labels, the same part of them, or varying parts.
 pub fn windows(random: &mut Random, plan: &Plan, level: usize) -> Plane<[u16; 2]> {
     let l = &plan.levels[level];
     let all = l.stride as u16;
@@ -126,7 +126,7 @@ pub fn pair(random: &mut Random, width: usize, height: usize) -> Pair {
     Pair::new(left, right).unwrap()
 }
 
-/// Options by which a pair is matched as it is: nothing stands between the images and the stages.
+/// Front-end options without corrections, so that the stages get the images unchanged.
 pub fn as_it_is() -> FrontOptions {
     let mut front = FrontOptions::default();
     (front.level_rows, front.equal_sharpness, front.denoise) = (false, false, false);
@@ -242,7 +242,7 @@ impl State {
         }
     }
 
-    /// All its volumes, with their values.
+    /// All volumes, with their values.
     pub fn volumes(&self) -> Vec<(Volume, &[u32])> {
         let mut all: Vec<(Volume, &[u32])> = Vec::new();
         for z in 0..self.evidence.len() {
@@ -259,7 +259,7 @@ impl State {
         all
     }
 
-    /// Writes all of it to `backend`, some value where none is defined.
+    /// Writes all volumes to `backend`, with an arbitrary value for undefined cells.
     pub fn write(&self, backend: &mut dyn Backend) {
         for (volume, values) in self.volumes() {
             let values: Vec<u32> = values.iter().map(|&v| if v == UNDEFINED { 77 } else { v }).collect();
@@ -267,7 +267,7 @@ impl State {
         }
     }
 
-    /// The same state where pixels have only the labels `has`.
+    /// The same state with the labels of pixels limited to `has`.
     pub fn within(mut self, plan: &Plan, graphs: &[LevelGraph], has: Vec<Vec<Range<usize>>>) -> Self {
         for z in 0..has.len() {
             let labels = plan.levels[z].labels;
@@ -295,14 +295,14 @@ impl State {
         self
     }
 
-    /// The twin's new beliefs of every level.
+    /// Updates the beliefs of every level by the twin.
     pub fn believe(&mut self, plan: &Plan, graphs: &[LevelGraph]) {
         for z in 0..plan.levels.len() {
             self.believe_at(plan, graphs, z);
         }
     }
 
-    /// The twin's new beliefs of one level.
+    /// Updates the beliefs of one level by the twin.
     pub fn believe_at(&mut self, plan: &Plan, graphs: &[LevelGraph], z: usize) {
         self.belief[z] = twin::belief::belief(
             plan,
@@ -345,14 +345,14 @@ pub fn evidence(random: &mut Random, plan: &Plan) -> Vec<Vec<u32>> {
 }
 
 /// A state in the middle of message passing. Messages have minimum 0 and are at most their truncation, and
-/// are 0 where a slot has no member or a factor has only one. Beliefs are the sums of their terms or, where
-/// `loose`, any values that are at most the largest belief and not below any message that is a term of them.
+/// are 0 for slots without a member and factors with a single one. Beliefs are the sums of their terms or, if
+/// `loose`, any values up to the largest belief and not below any message that is a term of them.
 pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: bool) -> State {
     let has = (0..plan.levels.len()).map(|z| twin::label_window::all(plan, z)).collect();
     state_within(random, plan, graphs, has, loose)
 }
 
-/// The same where pixels have only the labels `has`.
+/// Like [`state`], with the labels of pixels limited to `has`.
 pub fn state_within(
     random: &mut Random,
     plan: &Plan,
@@ -421,7 +421,7 @@ pub fn state_within(
     state
 }
 
-/// Maps that may occur after the estimate; where `filled`, with a validity that may occur after the fill.
+/// Maps that may occur after the estimate; if `filled`, with a validity that may occur after the fill.
 pub fn finest(random: &mut Random, plan: &Plan, filled: bool) -> Finest {
     let (width, height) = plan.size();
     let labels = plan.levels[0].labels as u32;
@@ -454,7 +454,7 @@ pub fn finest(random: &mut Random, plan: &Plan, filled: bool) -> Finest {
     maps
 }
 
-/// Flags that may occur before the fill or, where `filled`, after it.
+/// Flags that may occur before the fill or, if `filled`, after it.
 fn flags(random: &mut Random, width: usize, height: usize, filled: bool) -> Plane<i32> {
     let density = random.pick(&[1, 2, 3, 10, 1000]);
     Plane::from_fn(width, height, |x, y| {
@@ -467,7 +467,7 @@ fn flags(random: &mut Random, width: usize, height: usize, filled: bool) -> Plan
             let filled = filled && !random.one_in(4);
             let reason = match (reason, (x + y) % 3) {
                 (flag::SPECKLE, 1) => flag::TIE,
-                // The votes fill what they outvote.
+                // The vote fill also fills the pixels that it outvotes.
                 (flag::SPECKLE, 2) if filled => flag::OUTVOTED,
                 _ => reason,
             };

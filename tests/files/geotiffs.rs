@@ -1,4 +1,4 @@
-//! GeoTIFF: the tags of the images go along into their maps, whole or not at all.
+//! GeoTIFF: the georeference of an image is copied into its maps, completely or not at all.
 
 use super::file;
 use super::files::{Tiff, Values};
@@ -22,10 +22,10 @@ const KEYS: [u16; 16] = [1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 1026, 34_737,
 const DOUBLES: [f64; 2] = [6_378_137.0, 298.257_223_563];
 const NAME: &str = "WGS 84 /|";
 
-/// Rational polynomials; the third and fourth number are the line and the sample that they count from.
+/// Rational polynomial coefficients; the third and fourth values are the line and sample offsets.
 const POLYNOMIALS: [f64; 92] = [7.25; 92];
 
-/// All tags of GeoTIFF, and that of satellites.
+/// All GeoTIFF tags, and the RPC tag of satellite images.
 const ALL: [(u16, Values); 7] = [
     (33_550, Double(&SCALE)),
     (33_922, Double(&TIEPOINT)),
@@ -52,7 +52,7 @@ fn georeference(bytes: &[u8]) -> Option<Georeference> {
     left
 }
 
-/// A map with this georeference, to be read by another decoder.
+/// A map with this georeference, opened with another decoder.
 fn map(width: usize, georeference: Option<Georeference>) -> Decoder<Cursor<Vec<u8>>> {
     let map = Plane::filled(width, 1024, 1.0);
     let bytes = Writer { georeference }.encode_disparity(Path::new("a.tif"), &map).unwrap();
@@ -64,8 +64,8 @@ fn doubles(map: &mut Decoder<Cursor<Vec<u8>>>, tag: Tag) -> Vec<f64> {
 }
 
 #[test]
-fn all_tags_go_along() {
-    // Plain, and in packed tiles.
+fn all_tags_are_copied() {
+    // A small plain file, and a large one in compressed tiles.
     for (big_endian, width) in [(false, 2), (true, 2), (false, 5000)] {
         let map = &mut map(width, georeference(&image(&ALL, big_endian)));
         assert_eq!(map.find_tag(Tag::TileWidth).unwrap().is_some(), width == 5000);
@@ -84,13 +84,13 @@ fn all_tags_go_along() {
 }
 
 #[test]
-fn each_view_has_its_own() {
+fn each_view_has_its_own_georeference() {
     let (bare, one, other) = (image(&[], false), image(&ALL[..2], false), image(&ALL[2..], false));
     let both = pair(&one, &other);
     assert_eq!(both.georeferences(), [georeference(&one), georeference(&other)]);
     assert_ne!(georeference(&one), georeference(&other));
     assert_eq!(pair(&bare, &one).georeferences(), [None, georeference(&one)]);
-    // Other pixels lie elsewhere: those of a part begin at its first one.
+    // Mirroring drops the georeference; cropping moves its origin to the first pixel of the crop.
     assert_eq!(both.mirrored().georeferences(), [None, None]);
     let [one, other] = both.crop(&Rect { x: 1..2, y: 0..1 }).georeferences();
     let mut tiepoint = TIEPOINT;
@@ -106,9 +106,9 @@ fn each_view_has_its_own() {
     assert_eq!(map(2, None).find_tag(Tag::ModelPixelScaleTag).unwrap(), None);
 }
 
-/// A part of a georeference would place the image elsewhere.
+/// An incomplete georeference would place the image wrongly.
 #[test]
-fn a_damaged_georeference_is_left_out_whole() {
+fn a_damaged_georeference_is_dropped() {
     let with = |tag, values| {
         let mut tags = ALL.to_vec();
         tags.retain(|(other, _)| *other != tag);
@@ -129,7 +129,7 @@ fn a_damaged_georeference_is_left_out_whole() {
     ] {
         assert_eq!(georeference(&with(tag, values)), None, "{tag}");
     }
-    // The values of each tag end beyond the file.
+    // Counts that put the values past the end of the file.
     for (tag, _) in ALL {
         let mut bytes = image(&ALL, false);
         let entry = bytes.windows(2).rposition(|two| two == tag.to_le_bytes()).unwrap();

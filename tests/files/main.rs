@@ -1,4 +1,4 @@
-//! Unusual image files, by the rules of `Reader::pair`; users may have any of them.
+//! Unusual image files that users may have, read as `Reader::pair` documents.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -13,7 +13,7 @@ use mrfgs::image::{Image, Pair};
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// A file with these bytes, and its temporary folder.
+/// A temporary folder and a file in it with these bytes.
 fn file(bytes: &[u8]) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("image");
@@ -33,7 +33,7 @@ fn colours(bytes: &[u8]) -> Vec<Option<[u16; 3]>> {
     pixels.map(|([r, g, b, _], masked)| (!masked).then_some([r, g, b].map(|v| v >> 8))).collect()
 }
 
-/// The same for grey images.
+/// The grey level of every pixel, `None` where it is masked.
 fn greys(bytes: &[u8]) -> Vec<Option<u16>> {
     let grey = |[r, g, b]: [u16; 3]| {
         assert!(r == g && g == b);
@@ -59,10 +59,10 @@ fn small_depths_span_all_levels() {
     assert_eq!(png(1, &[0b0110_0000], 3), [0, 255, 255].map(Some));
     assert_eq!(png(2, &[0b0001_1011], 4), [0, 85, 170, 255].map(Some));
     assert_eq!(png(4, &[0x08, 0xf0], 3), [0, 136, 255].map(Some));
-    // In PBM 1 is black.
+    // In PBM, 1 is black.
     assert_eq!(greys(b"P4\n3 1\n\x60"), [255, 0, 0].map(Some));
     assert_eq!(greys(b"P1\n3 1\n0 1 1\n"), [255, 0, 0].map(Some));
-    // PNM declares its white.
+    // PNM files state their white level.
     assert_eq!(greys(b"P5\n3 1\n15\n\x00\x08\x0f"), [0, 136, 255].map(Some));
     assert_eq!(greys(b"P5\n2 1\n1023\n\x00\x00\x03\xff"), [0, 255].map(Some));
 }
@@ -84,13 +84,13 @@ fn palettes_are_looked_up_and_their_alpha_masks() {
 }
 
 #[test]
-fn alpha_masks_where_it_is_nothing_and_is_ignored_elsewhere() {
+fn zero_alpha_masks_and_other_alpha_is_ignored() {
     let rows = [0, 5, 0, 6, 1, 7, 255];
     assert_eq!(
         greys(&Png { size: (3, 1), colour: 4, rows: &rows, ..GREY }.bytes()),
         [None, Some(6), Some(7)]
     );
-    // 16 bits: an alpha whose upper byte is 0 is not 0.
+    // A 16-bit alpha whose upper byte is 0 is not 0.
     let rows = [0, 9, 9, 0, 0, 9, 9, 0, 1];
     assert_eq!(
         greys(&Png { size: (2, 1), depth: 16, colour: 4, rows: &rows, ..GREY }.bytes()),
@@ -114,7 +114,7 @@ fn interlaced_rows_come_in_order() {
 }
 
 #[test]
-fn jpeg_of_every_colour_model() {
+fn jpeg_of_every_colour_space() {
     let close = |bytes: &[u8], expected: [i32; 3]| {
         let image = left(bytes);
         assert_eq!((image.width(), image.height()), (8, 8));
@@ -127,7 +127,7 @@ fn jpeg_of_every_colour_model() {
     close(&jpeg(&[200], None, None), [200; 3]);
     // Y, Cb, Cr by BT.601: R = Y + 1.402 (Cr - 128) and so on.
     close(&jpeg(&[120, 148, 98], None, None), [78, 134, 155]);
-    // Adobe stores the inks inverted: 255 is none. Cyan and black determine red.
+    // Adobe stores inverted inks: 255 is no ink. Cyan and black determine red.
     close(&jpeg(&[200, 100, 50, 128], Some(0), None), [100, 50, 25]);
     close(&jpeg(&[255 / 2, 128, 128, 255], Some(2), None), [128; 3]);
 }
@@ -141,14 +141,14 @@ fn damage_within_a_jpeg_file_is_noticed() {
     picture.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Jpeg).unwrap();
     assert_eq!(left(&bytes).width(), 64);
     let middle = bytes.len() / 2;
-    // Sixteen ones in a row are not a valid code.
+    // Sixteen one bits are not a valid Huffman code.
     bytes[middle..middle + 8].copy_from_slice(&[0xff, 0, 0xff, 0, 0xff, 0, 0xff, 0]);
     refused(&bytes, &["corrupt", "get the file again"]);
 }
 
-/// Pixels are taken as stored, because a pair is rectified in its stored orientation.
+/// Pixels are read as stored, because a pair is rectified in its stored orientation.
 #[test]
-fn exif_orientation_turns_nothing() {
+fn exif_orientation_is_not_applied() {
     let turned = exif_orientation(6);
     let png = |chunks| Png { size: (3, 1), rows: &[0, 1, 2, 3], chunks, ..GREY }.bytes();
     let (plain, noted) = (png(&[]), png(&[(*b"eXIf", &turned)]));
@@ -157,9 +157,9 @@ fn exif_orientation_turns_nothing() {
     assert_eq!(left(&jpeg(&[9], None, Some(&turned))), left(&jpeg(&[9], None, None)));
 }
 
-/// Where the reader turns images upright, it does so by the tags of all formats, with what they mask.
+/// With `orient`, the reader applies the orientation tag of every format to pixels and mask.
 #[test]
-fn a_reader_may_turn_images_upright() {
+fn a_reader_can_turn_images_upright() {
     let upright = |bytes: &[u8]| {
         let (_folder, path) = file(bytes);
         Reader { orient: true, no_data: Some(3.0), ..Reader::default() }.pair(&path, &path, None).unwrap()
@@ -169,7 +169,7 @@ fn a_reader_may_turn_images_upright() {
         let pixels = image.pixels.data().iter().zip(image.masked.data());
         pixels.map(|(pixel, masked)| (!masked).then_some(pixel[3] >> 8)).collect::<Vec<_>>()
     };
-    // The third pixel holds no data; the first one is seen at the top, at the right, ...
+    // The third pixel is no data.
     for (tag, size, expected) in [
         (1, (3, 1), [Some(1), Some(2), None]),
         (2, (3, 1), [None, Some(2), Some(1)]),
@@ -190,7 +190,7 @@ fn a_reader_may_turn_images_upright() {
             assert!(pair.orientations().iter().all(|orientation| orientation.is_upright()));
         }
     }
-    // The pixels of this one are all the same; the mark of its pair tells.
+    // All pixels of these images are equal, so only the orientation stored with the pair shows the tag.
     let (_folder, path) = file(&jpeg(&[9], None, Some(&exif_orientation(6))));
     let stored = Pair::open(&path, &path).unwrap().orientations();
     assert!(stored.iter().all(|orientation| !orientation.is_upright()));
@@ -200,10 +200,10 @@ fn a_reader_may_turn_images_upright() {
     );
 }
 
-/// NaN and the infinities are masked. Of the other values the smallest becomes black and the largest white,
-/// negative ones included.
+/// NaN and infinite values are masked. Of the other values, negative ones included, the smallest becomes
+/// black and the largest white.
 #[test]
-fn float_values_beyond_all_bounds() {
+fn extreme_float_values() {
     let pfm = |values: &[f32]| {
         let data = values.iter().flat_map(|v| v.to_le_bytes());
         format!("Pf\n{} 1\n-1\n", values.len()).into_bytes().into_iter().chain(data).collect::<Vec<u8>>()

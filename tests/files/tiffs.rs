@@ -1,11 +1,11 @@
-//! TIFF: samples are interpreted as the tags say, or the file is rejected.
+//! TIFF: samples are read as the tags specify, or the file is rejected.
 
 use super::files::{Tiff, Values, jpeg};
 use super::{colours, file, greys, left, refused};
 use Values::{Fraction, Long, Short, Text};
 use mrfgs::image::read::{self, Reader};
 
-/// A file of 8-bit grey: `tags` replace or extend the required ones.
+/// An 8-bit grey file; `tags` replace or extend the required ones.
 fn grey(size: [u32; 2], tags: &[(u16, Values)], chunks: &[&[u8]]) -> Vec<u8> {
     image(size, &[(258, Short(&[8])), (262, Short(&[1]))], tags, chunks, false)
 }
@@ -38,7 +38,7 @@ fn known<T, const N: usize>(values: [T; N]) -> [Option<T>; N] {
 
 /// GDAL's `INTERLEAVE=BAND, TILED=YES`, for a size that is no multiple of the tile size.
 #[test]
-fn planes_in_tiles_that_stick_out() {
+fn planes_in_tiles_larger_than_the_image() {
     // 5 x 3 pixels in tiles of 4 x 2: two across, two down, for each of three planes.
     let value = |x: usize, y: usize, c: usize| (100 * c + 10 * y + x) as u8;
     let tile = |i: usize| -> Vec<u8> {
@@ -70,7 +70,7 @@ fn planes_in_tiles_that_stick_out() {
 }
 
 #[test]
-fn tiles_that_are_left_out_hold_no_data() {
+fn missing_tiles_hold_no_data() {
     let tags = [(322, Short(&[2])), (323, Short(&[1])), (42_113, Text("7"))];
     assert_eq!(greys(&grey([4, 1], &tags, &[&[], &[5, 6]])), [None, None, Some(5), Some(6)]);
     assert_eq!(greys(&grey([4, 1], &tags[..2], &[&[], &[5, 6]])), known([0, 0, 5, 6]));
@@ -85,12 +85,12 @@ fn bits_in_either_order() {
     assert_eq!(greys(&grey([4, 1], &[], &[&row])), expected);
     assert_eq!(greys(&grey([4, 1], &[least_first], &[&reversed])), expected);
     assert_ne!(greys(&grey([4, 1], &[], &[&reversed])), expected, "control");
-    // PackBits: four literal bytes; its own bytes are reversed too.
+    // PackBits with four literal bytes; its control bytes are reversed too.
     let packed = [&[3], &row[..]].concat();
     let reversed: Vec<u8> = packed.iter().map(|byte| byte.reverse_bits()).collect();
     assert_eq!(greys(&grey([4, 1], &[(259, Short(&[32_773]))], &[&packed])), expected);
     assert_eq!(greys(&grey([4, 1], &[(259, Short(&[32_773])), least_first], &[&reversed])), expected);
-    // Within JPEG, bits are not reversed.
+    // Bits inside JPEG data are not reversed.
     let jpeg = jpeg(&[200], None, None);
     let tags = [(259, Short(&[7])), least_first];
     assert_eq!(greys(&grey([8, 8], &tags, &[&jpeg])), [Some(200); 64]);
@@ -112,7 +112,7 @@ fn samples_of_every_depth() {
     assert_eq!(levels(3, &[0b0001_1101, 0b1000_0000], 3), spread(&[0, 255, 109]));
     assert_eq!(levels(4, &[0x08, 0xf0], 3), spread(&[0, 136, 255]));
     assert_eq!(levels(8, &[0, 7, 255], 3), spread(&[0, 7, 255]));
-    // Values of more bits are shifted up by the bits that all of them leave free.
+    // Deeper samples are shifted up by the bits that none of them uses.
     assert_eq!(levels(10, &[0xff, 0xc0, 0x10], 2), [1023 << 6, 1 << 6]);
     assert_eq!(levels(12, &[0x12, 0x3f, 0xff], 2), [0x123 << 4, 0xfff << 4]);
     assert_eq!(levels(14, &[0xff, 0xfc, 0x00, 0x10], 2), [0x3fff << 2, 1 << 2]);
@@ -126,7 +126,7 @@ fn samples_of_every_depth() {
     ] {
         assert_eq!(levels(bits, row, 3), [0, 26_112, 65_280], "{bits}");
     }
-    // The byte order is that of the file; packed bits have only one order.
+    // Samples follow the byte order of the file; packed bits have a single order.
     let big = unsigned(16, true, &[0x81, 0x23, 0xff, 0xff], 2);
     assert_eq!(big.pixels.data()[0][3], 0x8123);
     let big = unsigned(12, true, &[0x12, 0x3f, 0xff], 2);
@@ -216,7 +216,7 @@ fn palettes_of_every_depth() {
 }
 
 #[test]
-fn alpha_as_it_is_and_multiplied_into_the_colours() {
+fn alpha_plain_and_premultiplied() {
     let with = |extra: &[u16], row: &[u8]| {
         let tags = [(258, Short(&[8, 8, 8, 8])), (277, Short(&[4])), (338, Short(extra))];
         let tags = if extra.is_empty() { &tags[..2] } else { &tags[..] };
@@ -237,7 +237,7 @@ fn alpha_as_it_is_and_multiplied_into_the_colours() {
     let row = [0, 16, 0, 32, 0, 64, 0, 128];
     let pixel = left(&rgb([1, 1], &tags, &[&row])).pixels.data()[0];
     assert_eq!(pixel[..3], [0x1000, 0x2000, 0x4000].map(|v: u32| ((v * 65_535 + 0x4000) / 0x8000) as u16));
-    // More samples than these are not a picture.
+    // Files with more samples than these are not pictures.
     let tags = [(258, Short(&[8, 8])), (277, Short(&[2])), (338, Short(&[0]))];
     refused(&grey([2, 1], &tags, &[&[1, 2, 3, 4]]), &["2 bands", "extract one"]);
     let tags = [(258, Short(&[8; 5])), (277, Short(&[5])), (338, Short(&[0, 0]))];
@@ -256,7 +256,7 @@ fn inks_and_chroma() {
     };
     let full = (530, Short(&[1, 1]));
     assert_eq!(ycbcr(&[full], [1, 1], &[120, 148, 98]), known([[78, 135, 155]]));
-    // Pairs of columns and rows share their chroma, and the last ones extend beyond the image.
+    // 2 x 2 blocks share their chroma, and the last blocks extend beyond the image.
     let units = [120, 121, 122, 123, 148, 98, 50, 0, 51, 0, 128, 128];
     let found = ycbcr(&[(530, Short(&[2, 2]))], [3, 2], &units);
     assert_eq!(
@@ -264,7 +264,7 @@ fn inks_and_chroma() {
         known([[78, 135, 155], [79, 136, 156], [50; 3], [80, 137, 157], [81, 138, 158], [51; 3]])
     );
     assert_eq!(ycbcr(&[], [3, 2], &units), found, "as it is where nothing is said");
-    // Black at 16 and white at 235, as in video.
+    // The reference black is 16 and white 235, as in video.
     let video = Fraction(&[(16, 1), (235, 1), (128, 1), (240, 1), (128, 1), (240, 1)]);
     assert_eq!(
         ycbcr(&[full, (532, video)], [2, 1], &[16, 128, 128, 235, 128, 128]),
@@ -280,7 +280,7 @@ fn inks_and_chroma() {
 }
 
 #[test]
-fn what_is_no_picture_is_refused() {
+fn unsupported_files_are_refused() {
     for (photometric, words) in [
         (4_u16, "mask of another image"),
         (8, "Lab"),
@@ -309,8 +309,8 @@ fn what_is_no_picture_is_refused() {
 }
 
 #[test]
-fn the_first_image_that_is_no_copy_is_read() {
-    // Two directories by hand: that of a second file after the first.
+fn the_first_full_size_image_is_read() {
+    // Two directories, assembled by hand: the one of a second file follows the first.
     let chain = |kind: u32| {
         let mut first = grey([1, 1], &[(254, Long(&[kind]))], &[&[9]]);
         let second = grey([2, 1], &[], &[&[5, 6]]);
@@ -335,7 +335,7 @@ fn the_first_image_that_is_no_copy_is_read() {
 
 /// GDAL's tag, with every kind of sample.
 #[test]
-fn what_holds_no_data_is_masked() {
+fn no_data_pixels_are_masked() {
     let masked = |bits: u16, format: u16, text: &str, values: &[&[u8]]| {
         let tags = [(258, Short(&[bits])), (339, Short(&[format])), (42_113, Text(text))];
         let row = values.concat();
@@ -364,7 +364,7 @@ fn what_holds_no_data_is_masked() {
     let tags = [(258, Short(&[32])), (339, Short(&[3])), (42_113, Text("-3.4028235e+38"))];
     assert_eq!(greys(&grey([3, 1], &tags, &[&values])), [None, Some(0), Some(255)]);
     assert_eq!(greys(&grey([3, 1], &tags[..2], &[&values])), known([0, 255, 255]), "control");
-    // All colour samples must match, a palette matches by index, and an inverted image by its stored value.
+    // All colour samples must match. A palette matches by index, an inverted image by its stored value.
     let tag = (42_113, Text("3"));
     assert_eq!(colours(&rgb([2, 1], &[tag], &[&[3, 3, 3, 3, 3, 4]])), [None, Some([3, 3, 4])]);
     assert_eq!(greys(&grey([2, 1], &[(262, Short(&[0])), tag], &[&[3, 252]])), [None, Some(3)]);
@@ -372,7 +372,7 @@ fn what_holds_no_data_is_masked() {
 }
 
 #[test]
-fn the_caller_may_say_what_holds_no_data() {
+fn the_caller_can_set_the_no_data_value() {
     let (_folder, path) = file(&grey([3, 1], &[(42_113, Text("7"))], &[&[0, 7, 255]]));
     let masked = |no_data| {
         let reader = Reader { no_data, ..Reader::default() };
@@ -380,14 +380,14 @@ fn the_caller_may_say_what_holds_no_data() {
     };
     assert_eq!(masked(None), [false, true, false]);
     assert_eq!(masked(Some(255.0)), [false, false, true]);
-    // The same for other formats.
+    // Other formats use the value as well.
     let (_folder, path) = file(b"P5\n3 1\n255\n\x00\x07\xff");
     let reader = Reader { no_data: Some(0.0), ..Reader::default() };
     assert_eq!(reader.pair(&path, &path, None).unwrap().left().masked.data(), [true, false, false]);
 }
 
 #[test]
-fn maps_of_disparities_have_holes() {
+fn disparity_maps_have_holes() {
     let values = [-9999.0_f32, 5.0, 6.0].map(f32::to_le_bytes).concat();
     let tags = [(258, Short(&[32])), (339, Short(&[3])), (42_113, Text("-9999"))];
     let (_folder, path) = file(&grey([3, 1], &tags, &[&values]));

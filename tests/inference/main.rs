@@ -1,4 +1,4 @@
-//! What message passing computes: on trees the min-marginals of the joint distribution of equation (1),
+//! The results of message passing: on trees the min-marginals of the joint distribution of equation (1),
 //! checked by enumeration; on graphs with cycles the sum-product of equations (3) and (4), checked in
 //! floating point.
 

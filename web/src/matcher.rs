@@ -10,7 +10,7 @@ use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::program::tiles::Tiles;
 use mrfgs::options::{DeviceChoice, Execution, MatchSize, Method};
-use mrfgs::{Error, Found, Progress, Result};
+use mrfgs::{AutoRange, Error, Progress, Result};
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 use wasm_bindgen::JsValue;
@@ -64,7 +64,7 @@ impl Matcher {
         let method = method(preset, half.unwrap_or(false)).map_err(thrown)?;
         LISTENER.set(Some(progress));
         let job = if range.found {
-            self.matcher.job(&pair.pair, Found(range.range))
+            self.matcher.job(&pair.pair, AutoRange(range.range))
         } else {
             self.matcher.job(&pair.pair, range.range)
         };

@@ -3,24 +3,24 @@
 use mrfgs::Error;
 use mrfgs::check::Warning;
 use mrfgs::rectification::Doubt;
-use mrfgs::remedy::{self, Words};
+use mrfgs::remedy::{self, Vocabulary};
 use std::cell::Cell;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::object::object;
 
-const PAGE: Words = Words {
+const PAGE: Vocabulary = Vocabulary {
     min: "the lower end",
     max: "the upper end",
     range: Some("disparity range"),
     cpu: "use the program in place of the browser",
     driver: ["take one that has WebGPU", "update its driver or the browser"],
     unit: Some("choose the right one in the tab Points"),
-    ..Words::PLAIN
+    ..Vocabulary::PLAIN
 };
 
-const PACKAGE: Words = Words {
+const PACKAGE: Vocabulary = Vocabulary {
     preset: "method",
     min: "minDisparity",
     max: "maxDisparity",
@@ -31,7 +31,7 @@ const PACKAGE: Words = Words {
 };
 
 thread_local! {
-    static WORDS: Cell<&'static Words> = const { Cell::new(&PAGE) };
+    static WORDS: Cell<&'static Vocabulary> = const { Cell::new(&PAGE) };
 }
 
 /// What has rectified a pair.

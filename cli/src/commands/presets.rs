@@ -91,7 +91,7 @@ fn listing(all: bool) -> String {
     table.row(cells("key", PRESETS.iter().map(|preset| preset.name.to_owned()).collect()));
     for group in GROUPS {
         table.text(format!("\n[{}] {}", group.name, group.meaning));
-        for key in group.keys.iter().filter(|key| all || !key.of_readings) {
+        for key in group.keys.iter().filter(|key| all || !key.for_reproduction) {
             let name = key.name();
             let values = values.iter().map(|values| values[group.name][&name].to_string().replace('"', ""));
             table.text("");

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mrfgs::depth::Rig;
-use mrfgs::image::cloud::Frame;
+use mrfgs::image::cloud::PointFrame;
 use mrfgs::image::{Plane, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
@@ -41,7 +41,7 @@ pub(super) enum Kind {
     /// The errors to expect, of disparities or of depths, as float like depths.
     Sigma(Of),
     /// A cloud of points, as PLY unless the word has an extension.
-    Points(Frame),
+    Points(PointFrame),
     /// The disparity map in colours, as PNG; with the left image on its left if `beside`.
     Picture { beside: bool },
 }
@@ -90,19 +90,19 @@ pub(super) static ALL: [Also; 20] = [
         "Points with the colours of LEFT and their confidence: binary .ply (`quality`), x to the right, y down, z forward \
          of the left camera. Invalid, filled and low-confidence pixels are left out. points.pcd writes PCD (`intensity`, \
          for ROS, PCL and Open3D), points.las and points.laz write LAS 1.2 and LAZ (intensity: 257 times the confidence)",
-        Kind::Points(Frame::Matched),
+        Kind::Points(PointFrame::Matched),
     ),
-    row("points.pcd", "", Kind::Points(Frame::Matched)),
-    row("points.las", "", Kind::Points(Frame::Matched)),
-    row("points.laz", "", Kind::Points(Frame::Matched)),
+    row("points.pcd", "", Kind::Points(PointFrame::Matched)),
+    row("points.las", "", Kind::Points(PointFrame::Matched)),
+    row("points.laz", "", Kind::Points(PointFrame::Matched)),
     row(
         "points-original",
         "The same in the frame of the left camera before --rectify: that of the calibration. Also as .pcd, .las and .laz",
-        Kind::Points(Frame::Original),
+        Kind::Points(PointFrame::Original),
     ),
-    row("points-original.pcd", "", Kind::Points(Frame::Original)),
-    row("points-original.las", "", Kind::Points(Frame::Original)),
-    row("points-original.laz", "", Kind::Points(Frame::Original)),
+    row("points-original.pcd", "", Kind::Points(PointFrame::Original)),
+    row("points-original.las", "", Kind::Points(PointFrame::Original)),
+    row("points-original.laz", "", Kind::Points(PointFrame::Original)),
     row(
         "confidence",
         "The confidence: 8-bit .png, 0 to 255, how far the runner-up label is behind the best one, in 1/8 nat, as a mean over the pixels around",
@@ -147,7 +147,7 @@ impl Also {
             Kind::Millimetres => Some(messages::MILLIMETRES),
             Kind::Sigma(Of::Disparities) => Some(messages::SIGMA),
             Kind::Sigma(Of::Depths) => Some(messages::DEPTH_SIGMA),
-            Kind::Points(Frame::Matched) if self.word == self.stem() => Some(messages::POINTS),
+            Kind::Points(PointFrame::Matched) if self.word == self.stem() => Some(messages::POINTS),
             Kind::Bytes(_) => Some(messages::of_bytes(self.word)),
             Kind::Registered { millimetres: false } => Some(messages::REGISTERED),
             Kind::Registered { millimetres: true } => Some(messages::REGISTERED_MILLIMETRES),

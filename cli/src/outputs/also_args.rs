@@ -7,7 +7,7 @@ use mrfgs::calibration::cameras::ThirdCamera;
 use mrfgs::calibration::third;
 use mrfgs::colour::{self, ColourMap};
 use mrfgs::depth::Rig;
-use mrfgs::image::cloud::Frame;
+use mrfgs::image::cloud::PointFrame;
 use mrfgs::image::write::Writer;
 use mrfgs::image::{Plane, write};
 use mrfgs::options::{DisparityRange, Method};
@@ -109,7 +109,7 @@ impl AlsoArgs {
             let reason = "are those of a preview; add --also preview, or leave --colours out";
             return Err(Failure::usage("--colours", reason));
         }
-        let is_original = |also: &&Also| matches!(also.kind, Kind::Points(Frame::Original));
+        let is_original = |also: &&Also| matches!(also.kind, Kind::Points(PointFrame::Original));
         if let Some(word) = self.wanted().find(is_original).filter(|_| !rectifies) {
             let reason =
                 "is of images that `mrfgs match` rectifies; add --rectify there, or take --also points";
@@ -156,7 +156,7 @@ impl AlsoArgs {
                 Kind::Depth
                     | Kind::Millimetres
                     | Kind::Registered { .. }
-                    | Kind::Points(Frame::Matched)
+                    | Kind::Points(PointFrame::Matched)
                     | Kind::Picture { .. }
             )
         };
@@ -298,8 +298,8 @@ impl AlsoArgs {
             }
             Kind::Points(frame) => {
                 let rig = match frame {
-                    Frame::Matched => rig,
-                    Frame::Original => rig.zip(rectifying).map(|(rig, by)| rig.in_original_frame(&by)),
+                    PointFrame::Matched => rig,
+                    PointFrame::Original => rig.zip(rectifying).map(|(rig, by)| rig.in_original_frame(&by)),
                 };
                 let (Some(rig), Some(left)) = (rig, left) else { return Ok(None) };
                 let cloud = rig.cloud(&self.limits.trusted(maps, &rig), left);

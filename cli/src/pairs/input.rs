@@ -329,11 +329,11 @@ impl Input {
     }
 
     /// What is probably wrong with the pair and its calibration, in these `words`.
-    pub(crate) fn warnings(&self, words: &remedy::Words) -> Vec<String> {
+    pub(crate) fn warnings(&self, words: &remedy::Vocabulary) -> Vec<String> {
         self.warnings_of(&self.pair, words)
     }
 
-    fn warnings_of(&self, pair: &Pair, words: &remedy::Words) -> Vec<String> {
+    fn warnings_of(&self, pair: &Pair, words: &remedy::Vocabulary) -> Vec<String> {
         let mut said = Vec::new();
         let files = self.calibration.as_ref().map_or(&[][..], |known| &known.files);
         if let Some(by) = &self.rectification {

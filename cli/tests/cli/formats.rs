@@ -55,7 +55,7 @@ const WRONG: &[(&str, &str, &str, &str)] = &[
     ("DepthAI", "\"leftCameraSocket\":1", "\"leftCameraSocket\":5", "has no camera at socket 5 & DepthAI's"),
     ("DepthAI", "\"toCameraSocket\":2", "\"toCameraSocket\":-1", "no extrinsics lead & calibrate again"),
     ("COLMAP", "240 180", "240", "expected CAMERA_ID, MODEL, WIDTH, HEIGHT & COLMAP's"),
-    ("COLMAP", "3 OPENCV", "9 OPENCV", "is of camera 3, which cameras.txt has not"),
+    ("COLMAP", "3 OPENCV", "9 OPENCV", "is of camera 3, which cameras.txt lacks"),
     (
         "ROS with binning",
         "x_offset: 20",

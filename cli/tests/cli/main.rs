@@ -430,7 +430,7 @@ fn presets_can_be_pasted_into_a_file() {
     let names =
         |text: &str, key: &options::Key| text.lines().any(|l| l.split(' ').next() == Some(&key.name()));
     for group in options::GROUPS {
-        assert!(group.keys.iter().all(|key| names(&short, key) != key.of_readings), "{}", group.name);
+        assert!(group.keys.iter().all(|key| names(&short, key) != key.for_reproduction), "{}", group.name);
         assert!(listing.lines().any(|l| l.starts_with(&format!("[{}] ", group.name))), "{}", group.name);
         for key in group.keys {
             let mut lines = listing.lines().skip_while(|l| l.split(' ').next() != Some(&key.name()));

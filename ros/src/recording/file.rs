@@ -25,7 +25,7 @@ impl File {
         let path = &place.path;
         let opened = fs::File::open(place.file()).map_err(|e| match e.kind() {
             std::io::ErrorKind::NotFound => {
-                Error::read(path, Reason::of(e, "there is no such file; check the name"))
+                Error::read(path, Reason::from_io(e, "there is no such file; check the name"))
             }
             _ => Error::read(path, e),
         })?;

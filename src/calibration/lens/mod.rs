@@ -1,4 +1,4 @@
-//! What a lens does to a ray.
+//! Lens models.
 
 mod radial_tangential;
 mod wide;
@@ -8,28 +8,28 @@ use crate::image::calib::{Camera, Fit};
 
 pub use radial_tangential::RadialTangential;
 
-/// A camera with its lens: where a ray meets the image. Pixels count from the centre of the top left one.
+/// A camera with its lens: projects rays to pixels. Coordinates count from the centre of the top left pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
-    /// Focal length across and down, in pixels.
+    /// Horizontal and vertical focal length, in pixels.
     pub(crate) focal_length: [f64; 2],
     /// Where the optical axis meets the image, in pixels.
     pub(crate) principal_point: [f64; 2],
     pub(crate) distortion: Distortion,
-    /// How far from the axis the lens is known: the tangent of the angle. Beyond, the radius in the image turns back.
+    /// The valid field: the tangent of the angle to the axis beyond which the image radius no longer grows.
     reach: f64,
 }
 
-/// How a lens departs from a pinhole.
+/// The distortion of a lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Distortion {
-    /// Radial and tangential, as OpenCV's: `plumb_bob`, `rational_polynomial`, `radtan`; also with thin prism and tilt.
+    /// OpenCV's lenses: `plumb_bob`, `radtan`, `rational_polynomial`, also with thin prism and tilt.
     RadialTangential(RadialTangential),
-    /// Fisheye: the angle to the axis times a polynomial of its square, k1 to k4. OpenCV's `fisheye`, `equidistant`, the model
-    /// of Kannala and Brandt.
+    /// Fisheye: the angle to the axis times a polynomial of its square, k1 to k4. OpenCV's `fisheye`,
+    /// `equidistant`, the model of Kannala and Brandt.
     Equidistant([f64; 4]),
-    /// The same, then what a decentred lens and a thin prism add: COLMAP's `THIN_PRISM_FISHEYE`.
+    /// The fisheye, plus the terms of a decentred lens and a thin prism: COLMAP's `THIN_PRISM_FISHEYE`.
     ThinPrismFisheye {
         /// k1 to k4.
         k: [f64; 4],
@@ -40,31 +40,31 @@ pub enum Distortion {
     },
     /// The unified model, `omni`, of Mei and Rives: a sphere seen from xi behind its centre, then radial and tangential distortion.
     Unified {
-        /// How far behind the centre.
+        /// The distance behind the centre.
         xi: f64,
-        /// The distortion that follows.
+        /// The distortion that follows the projection.
         then: RadialTangential,
     },
     /// Double sphere, `ds`.
     DoubleSphere {
-        /// Distance of the spheres.
+        /// Distance between the spheres.
         xi: f64,
-        /// Share of the sphere.
+        /// Weight of the second sphere.
         alpha: f64,
     },
     /// The extended unified model, `eucm`. With a beta of 1 it is the unified one without distortion, `ucm`.
     ExtendedUnified {
-        /// Share of the ellipsoid.
+        /// Weight of the ellipsoid.
         alpha: f64,
-        /// Its shape.
+        /// Shape of the ellipsoid.
         beta: f64,
     },
-    /// By the field of view, in radians: `fov`, `atan`.
+    /// The field-of-view model, in radians: `fov`, `atan`.
     FieldOfView(f64),
 }
 
 impl Distortion {
-    /// Of a pinhole.
+    /// The distortion of a pinhole.
     pub const NONE: Self = Self::RadialTangential(RadialTangential::NONE);
 
     fn numbers(&self) -> Vec<f64> {
@@ -79,7 +79,7 @@ impl Distortion {
         }
     }
 
-    /// The radius in the image of what is `tangent` away from the axis in the plane z = 1, before any tangential part.
+    /// The image radius of a point at `tangent` from the axis in the plane z = 1, before tangential terms.
     fn radius(&self, tangent: f64) -> f64 {
         match *self {
             Self::RadialTangential(_) => tangent,
@@ -93,13 +93,13 @@ impl Distortion {
         }
     }
 
-    /// Where a point of the plane z = 1 appears in the image, in focal lengths from the axis.
+    /// The image of a point of the plane z = 1, in focal lengths from the axis.
     fn distorted(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         if let Self::RadialTangential(model) = self {
             return model.distorted([x, y]);
         }
         let tangent = (x * x + y * y).sqrt();
-        // On the axis itself, any number serves.
+        // On the axis, the factor does not matter.
         let factor = if tangent == 0.0 { 1.0 } else { self.radius(tangent) / tangent };
         let at = [x * factor, y * factor];
         match self {
@@ -112,10 +112,10 @@ impl Distortion {
         }
     }
 
-    /// The tangent of the angle to the axis up to which the radius in the image grows with the angle.
+    /// The tangent of the angle to the axis up to which the image radius grows with the angle.
     fn reach(&self) -> f64 {
         const STEPS: i32 = 4096;
-        // The last step would be at a right angle.
+        // The last step would be at 90 degrees.
         let tangents = (1..STEPS).map(|i| {
             let angle = f64::from(i) / f64::from(STEPS) * std::f64::consts::FRAC_PI_2;
             (angle, libm::tan(angle))
@@ -137,16 +137,16 @@ impl Distortion {
     }
 }
 
-/// What a decentred lens and a thin prism add to a fisheye, for a point of the plane z = 1.
+/// The decentring and thin prism terms of a fisheye, for a point of the plane z = 1.
 fn of_prism(tangential: [f64; 2], prism: [f64; 2], at: [f64; 2]) -> [f64; 2] {
     let tangent = (at[0] * at[0] + at[1] * at[1]).sqrt();
-    // Where a fisheye without coefficients shows it: as far from the axis as its angle.
+    // The point of an ideal fisheye, whose radius is the angle.
     let factor = if tangent == 0.0 { 1.0 } else { libm::atan(tangent) / tangent };
     RadialTangential::thin_prism(tangential, prism).added(at.map(|v| v * factor), 0.0)
 }
 
 impl Lens {
-    /// A lens with this focal length across and down, principal point (both in pixels) and distortion.
+    /// A lens with these focal lengths and principal point, in pixels, and this distortion.
     ///
     /// # Errors
     /// [`Error::Calibration`] when a number is not finite or a focal length not above 0.
@@ -161,14 +161,14 @@ impl Lens {
         Ok(Self { focal_length, principal_point, distortion, reach: distortion.reach() })
     }
 
-    /// The lens in pixels of images of another size.
+    /// The lens for scaled or cropped images.
     pub(crate) fn in_size(&self, fit: &Fit) -> Self {
         let Camera { focal_length, principal_point } =
             Camera { focal_length: self.focal_length, principal_point: self.principal_point }.in_size(fit);
         Self { focal_length, principal_point, ..*self }
     }
 
-    /// Focal length across and down, in pixels.
+    /// Horizontal and vertical focal length, in pixels.
     #[must_use]
     pub fn focal_length(&self) -> [f64; 2] {
         self.focal_length
@@ -180,14 +180,14 @@ impl Lens {
         self.principal_point
     }
 
-    /// How it departs from a pinhole.
+    /// The distortion of the lens.
     #[must_use]
     pub fn distortion(&self) -> Distortion {
         self.distortion
     }
 
-    /// Where the ray (x, y, z), z forward, meets the image. `None` for a ray from behind, and so far from the axis that the
-    /// radius in the image has turned back.
+    /// The pixel of the ray (x, y, z), z forward. `None` for a ray from behind, and for one outside the valid
+    /// field.
     #[must_use]
     pub fn project(&self, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
         let (x, y) = (x / z, y / z);
@@ -201,8 +201,8 @@ impl Lens {
         std::array::from_fn(|i| self.focal_length[i] * at[i] + self.principal_point[i])
     }
 
-    /// About where the ray of a pixel meets the plane z = 1, as near as OpenCV's `undistortPoints` comes in its default number
-    /// of steps. The frame of a rectified view follows from such points, and is so the same as OpenCV's.
+    /// Approximates the point of a pixel in the plane z = 1, as precisely as OpenCV's `undistortPoints` in its
+    /// default number of steps. Rectified views are framed by such points, so their frame is the same as OpenCV's.
     pub(crate) fn nearly_undistorted(&self, pixel: [f64; 2]) -> [f64; 2] {
         let start: [f64; 2] =
             std::array::from_fn(|i| (pixel[i] - self.principal_point[i]) / self.focal_length[i]);
@@ -232,13 +232,13 @@ impl Lens {
         }
     }
 
-    /// The point of the plane z = 1 that appears at `at`, where the model is radial; one at the end of its reach for what is beyond.
+    /// The point of the plane z = 1 with the image `at` in a radial model, or one at the edge of the field.
     fn at_radius(&self, at: [f64; 2]) -> [f64; 2] {
         let radius = (at[0] * at[0] + at[1] * at[1]).sqrt();
         if radius <= 1e-12 {
             return at;
         }
-        // By halves: the radius grows with the tangent.
+        // Bisection, since the radius grows with the tangent.
         let (mut low, mut high) = (0.0, self.reach);
         for _ in 0..64 {
             let middle = f64::midpoint(low, high);
@@ -251,7 +251,7 @@ impl Lens {
         at.map(|v| v * low / radius)
     }
 
-    /// Whether it is a fisheye, or another lens whose radius in the image is not about the tangent of the angle.
+    /// Whether the image radius is not close to the tangent of the angle: fisheyes and other wide lenses.
     pub(crate) fn is_wide(&self) -> bool {
         !matches!(self.distortion, Distortion::RadialTangential(_))
     }
@@ -275,12 +275,12 @@ mod tests {
     }
 
     #[test]
-    fn coefficients_come_back() {
+    fn coefficients_survive_a_round_trip() {
         let all: Vec<f64> = (1..=14).map(|i| f64::from(i) / 100.0).collect();
         for (given, kept) in [(0, 5), (4, 5), (5, 5), (8, 8), (12, 12), (14, 14)] {
             let found = RadialTangential::new(&all[..given]).unwrap().coefficients();
             assert_eq!(found.len(), kept);
-            // The angles of the tilt come back by way of its matrix.
+            // The angles of the tilt are recovered from its matrix.
             let all = all[..given].iter().chain(&[0.0; 5]);
             assert!(found.iter().zip(all).all(|(found, c)| (found - c).abs() < 1e-15), "{found:?}");
         }
@@ -298,8 +298,8 @@ mod tests {
     }
 
     #[test]
-    fn distortion_goes_by_the_formulas() {
-        // r2 = 0.25 + 0.0625; worked out by hand from the formulas of OpenCV's manual.
+    fn distortion_follows_the_formulas() {
+        // r2 = 0.25 + 0.0625; computed by hand from the formulas of OpenCV's manual.
         let seen = lens(radial(&[-0.2, 0.04, 0.001, 0.002, -0.01]));
         let (x, y, r2) = (0.5, -0.25, 0.3125_f64);
         let factor = 1.0 - 0.2 * r2 + 0.04 * r2 * r2 - 0.01 * r2 * r2 * r2;
@@ -336,9 +336,9 @@ mod tests {
         }
     }
 
-    /// Worked out from the definitions in the papers, point by point, by `scripts/rectify` the same at many.
+    /// Computed by hand from the definitions in the papers; `scripts/rectify` checks many more points.
     #[test]
-    fn wide_lenses_go_by_their_formulas() {
+    fn wide_lenses_follow_their_formulas() {
         let ray = [0.6_f64, 0.0, 0.8];
         // The ray has length 1 and the tangent 0.75.
         let unified = Distortion::Unified { xi: 0.5, then: RadialTangential::NONE };
@@ -371,14 +371,14 @@ mod tests {
     }
 
     #[test]
-    fn where_the_polynomial_turns_back_there_is_nothing() {
+    fn rays_beyond_the_growing_radius_have_no_image() {
         // r (1 - 0.5 r2) grows up to r = 0.816.
         let lens = lens(radial(&[-0.5, 0.0, 0.0, 0.0]));
         assert!(lens.project([0.81, 0.0, 1.0]).is_some() && lens.project([0.82, 0.0, 1.0]).is_none());
     }
 
     #[test]
-    fn coefficients_are_told_by_their_number() {
+    fn unknown_numbers_of_coefficients_are_refused() {
         for count in [1, 2, 3, 6, 7, 9, 13, 15] {
             assert!(RadialTangential::new(&vec![0.0; count]).is_err(), "{count}");
         }

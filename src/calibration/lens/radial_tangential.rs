@@ -1,8 +1,8 @@
-//! OpenCV's model: polynomials of the radius, decentred lenses, thin prisms and a tilted sensor.
+//! OpenCV's distortion model: polynomials of the radius, decentred lenses, thin prisms and a tilted sensor.
 
 use crate::calibration::matrix::{Matrix, product, rotated, transposed};
 
-/// Radial and tangential distortion, with a thin prism and a tilt of the sensor where there are such.
+/// Radial and tangential distortion, with an optional thin prism and tilt of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RadialTangential {
     /// k1 to k6.
@@ -16,14 +16,14 @@ pub struct RadialTangential {
 }
 
 impl RadialTangential {
-    /// That of a pinhole.
+    /// The distortion of a pinhole.
     pub const NONE: Self = Self { radial: [0.0; 6], tangential: [0.0; 2], prism: [0.0; 4], tilt: None };
 
-    /// The coefficients of the order k1, k2, p1, p2, k3 to k6, s1 to s4, and the angles of the tilt, as most files have them:
-    /// none, 4, 5, 8, 12 or 14. The error says what was expected.
+    /// Takes coefficients in the usual order: k1, k2, p1, p2, k3 to k6, s1 to s4, and the angles of the tilt.
+    /// Their number is 0, 4, 5, 8, 12 or 14. The error says what was expected.
     ///
     /// # Errors
-    /// For another number of coefficients, and for a sensor at right angles to its lens.
+    /// For another number of coefficients, and for a sensor perpendicular to its lens.
     pub fn new(coefficients: &[f64]) -> Result<Self, &'static str> {
         if !matches!(coefficients.len(), 0 | 4 | 5 | 8 | 12 | 14) {
             return Err(
@@ -41,11 +41,11 @@ impl RadialTangential {
         Ok(Self { prism: [c(8), c(9), c(10), c(11)], tilt, ..plain })
     }
 
-    /// Its coefficients, as [`new`](Self::new) takes them: 5, or as many more as are not 0.
+    /// The coefficients in the order of [`new`](Self::new): 5, or more if those are not 0.
     #[must_use]
     pub fn coefficients(&self) -> Vec<f64> {
         let [k1, k2, rest @ ..] = self.radial;
-        // The last row of the turn stands in the way to the sensor as it is.
+        // The last row of the rotation is also that of the projection to the sensor.
         let tilt = self.tilt.map_or([0.0; 2], |[[_, _, [x, y, z]], _]| [libm::atan2(-y, z), libm::asin(x)]);
         let mut all = [&[k1, k2], &self.tangential[..], &rest, &self.prism, &tilt].concat();
         for (shorter, longer) in [(12, 14), (8, 12), (5, 8)] {
@@ -56,12 +56,12 @@ impl RadialTangential {
         all
     }
 
-    /// That of k1, k2, p1, p2, k3 to k6.
+    /// The model of k1, k2, p1, p2, k3 to k6.
     pub(crate) fn polynomials([k1, k2, p1, p2, k3, k4, k5, k6]: [f64; 8]) -> Self {
         Self { radial: [k1, k2, k3, k4, k5, k6], tangential: [p1, p2], ..Self::NONE }
     }
 
-    /// That of p1, p2 and a thin prism whose part grows with the square of the radius, across and down.
+    /// The model of p1, p2 and a thin prism with the quadratic shifts `s1` and `s3`.
     pub(super) fn thin_prism(tangential: [f64; 2], [across, down]: [f64; 2]) -> Self {
         Self { tangential, prism: [across, 0.0, down, 0.0], ..Self::NONE }
     }
@@ -71,7 +71,7 @@ impl RadialTangential {
         [&self.radial[..], &self.tangential, &self.prism].concat().into_iter().chain(tilt.copied()).collect()
     }
 
-    /// What is added to a point that is `factor` times (x, y): the tangential part and the prism.
+    /// `factor` times (x, y), plus the tangential part and the prism.
     pub(super) fn added(&self, [x, y]: [f64; 2], factor: f64) -> [f64; 2] {
         let ([p1, p2], [s1, s2, s3, s4]) = (self.tangential, self.prism);
         let r2 = x * x + y * y;
@@ -81,14 +81,14 @@ impl RadialTangential {
         ]
     }
 
-    /// Where a point of the plane z = 1 appears in it.
+    /// The image of a point of the plane z = 1.
     pub(super) fn distorted(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [above, below] = self.factor(x * x + y * y);
         let at = self.added([x, y], above / below);
         self.tilt.map_or(at, |[there, _]| through(&there, at))
     }
 
-    /// About the inverse, by this number of steps, as OpenCV has it.
+    /// Approximates the inverse by the given number of OpenCV's iterations.
     pub(super) fn nearly_undistorted(&self, start: [f64; 2], steps: usize) -> [f64; 2] {
         let flat = self.tilt.map_or(start, |[_, back]| through(&back, start));
         let [mut x, mut y] = flat;
@@ -111,7 +111,7 @@ impl RadialTangential {
         [1.0 + ((k3 * r2 + k2) * r2 + k1) * r2, 1.0 + ((k6 * r2 + k5) * r2 + k4) * r2]
     }
 
-    /// Whether the radius in the image grows with that in the plane, whose square is `r2`.
+    /// Whether the image radius grows with the radius in the plane, whose square is `r2`.
     pub(super) fn grows(&self, r2: f64) -> bool {
         let k = self.radial;
         let [above, below] = self.factor(r2);
@@ -121,13 +121,13 @@ impl RadialTangential {
     }
 }
 
-/// Where the ray of a point of the plane z = 1 meets that plane after `turn`.
+/// The point of the plane z = 1 on the ray of such a point after `turn`.
 fn through(turn: &Matrix, [x, y]: [f64; 2]) -> [f64; 2] {
     let [x, y, z] = rotated(turn, [x, y, 1.0]);
     [x / z, y / z]
 }
 
-/// From the plane of a lens to a sensor that is turned by these angles about x and then y, and back. `None` from a right angle on.
+/// From the plane of a lens to a sensor that is rotated by these angles about x and then y, and back. `None` at 90 degrees or more.
 fn tilted([about_x, about_y]: [f64; 2]) -> Option<[Matrix; 2]> {
     let ([sx, cx], [sy, cy]) =
         ([libm::sin(about_x), libm::cos(about_x)], [libm::sin(about_y), libm::cos(about_y)]);

@@ -1,27 +1,27 @@
-//! Compression: JPEG cuts an image into blocks of 8 x 8 pixels, and the lower the quality, the higher the steps between them.
+//! Compression: JPEG divides an image into blocks of 8 x 8 pixels, with higher steps between them at lower quality.
 
 use crate::image::{Image, Pair};
 use crate::threads::prelude::*;
 use std::array::from_fn;
 
-/// By how much both views are smoothed (a standard deviation in pixels), where the steps between blocks are at least this many times as
-/// high as elsewhere (open). Of 49 real pairs none reaches 1.05, of the rendered scenes none 1.13. Of eight pairs, qualities of 75, 50, 20
-/// and 5 give 1.12 to 1.31, 1.27 to 1.53, 1.55 to 2.1 and 2.4 to 4.6; with each of these, the standard deviation stated here is the best
-/// or next to it.
+/// Pairs of a step ratio and a standard deviation in pixels: if the steps between blocks are at least this many
+/// times as high as elsewhere, both views are smoothed by that (open). Of 49 real pairs none reaches 1.05, of
+/// the rendered scenes none 1.13. Of eight pairs, qualities of 75, 50, 20 and 5 give 1.12 to 1.31, 1.27 to
+/// 1.53, 1.55 to 2.1 and 2.4 to 4.6; at each of these, the standard deviation here is the best or next to it.
 const SMOOTHING: [(f64, f64); 4] = [(2.3, 1.6), (1.55, 1.0), (1.25, 0.7), (1.15, 0.5)];
 /// Side of a block, in pixels.
 const BLOCK: usize = 8;
-/// Steps count up to this many 8-bit levels, so that contours of the scene do not decide.
+/// Steps are limited to this many 8-bit levels, so that contours of the scene do not decide.
 const MAX_STEP: u16 = 20;
 
-/// The standard deviation of the Gaussian by which both views are to be smoothed; 0 where at least one of them shows no blocks.
+/// The standard deviation by which to smooth both views; 0 if at least one of them has no blocks.
 pub(super) fn smoothing(pair: &Pair) -> f64 {
     let steps = f64::min(steps(pair.left()), steps(pair.right()));
     SMOOTHING.iter().find(|(least, _)| steps >= *least).map_or(0.0, |(_, sigma)| *sigma)
 }
 
-/// The mean step of grey between blocks, relative to that between other pixels; 1 where there is none. Blocks may begin anywhere, since an
-/// image may be a part of another.
+/// The mean step of grey between blocks, relative to that between other pixels; 1 if there is none. Blocks
+/// may begin anywhere, since an image may be cropped.
 fn steps(image: &Image) -> f64 {
     let (width, height) = image.pixels.size();
     let any_masked = image.any_masked();
@@ -55,7 +55,7 @@ fn steps(image: &Image) -> f64 {
     if within > 0.0 { between / within } else { 1.0 }
 }
 
-/// Sums of steps and their number, by place in a block.
+/// Sums and numbers of steps, by position in a block.
 #[derive(Clone, Copy, Default)]
 struct Steps {
     sums: [u64; BLOCK],
@@ -63,7 +63,7 @@ struct Steps {
 }
 
 impl Steps {
-    /// Adds the steps between `others` and `row`, but those of masked pixels.
+    /// Adds the steps between `others` and `row`, except those of masked pixels.
     fn add_row(&mut self, row: &[u16], others: &[u16], masked: Option<[&[bool]; 2]>) {
         if let Some([masked, others_masked]) = masked {
             let pixels = row.iter().zip(others).zip(masked.iter().zip(others_masked)).enumerate();
@@ -73,7 +73,7 @@ impl Steps {
             }
             return;
         }
-        // So many steps fit in 32 bits.
+        // The sums of so many steps fit in 32 bits.
         for (row, others) in row.chunks(BLOCK << 16).zip(others.chunks(BLOCK << 16)) {
             let mut sums = [0_u32; BLOCK];
             let ((row, rest), (others, others_rest)) =
@@ -93,7 +93,7 @@ impl Steps {
         }
     }
 
-    /// The same steps, all at `place`.
+    /// All steps counted at one `place`.
     fn all_at(&self, place: usize) -> Self {
         let mut all = Self::default();
         (all.sums[place % BLOCK], all.counts[place % BLOCK]) =
@@ -108,7 +108,7 @@ impl Steps {
         }
     }
 
-    /// The largest mean of any place, and the mean of those of all other places.
+    /// The largest mean of any place, and the average of all others.
     fn means(&self) -> (f64, f64) {
         let means: [f64; BLOCK] = from_fn(|i| self.sums[i] as f64 / self.counts[i].max(1) as f64);
         let largest = means.into_iter().fold(0.0, f64::max);
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use crate::image::Plane;
 
-    /// A slope in blocks of this side that begin at this place, each of one grey.
+    /// A slope in blocks of this side, each of one grey, that begin at this offset.
     fn blocks(side: usize, begin: usize) -> Image {
         let grey =
             |x: usize, y: usize| (64 * ((x + side - begin) / side + (y + side - begin) / side) % 256) as u8;

@@ -1,36 +1,36 @@
-//! Noise: what the two views do not share of their finest detail, because of their sensors or of compression.
+//! Noise: the finest detail that the two views do not share, because of their sensors or of compression.
 
 use super::rows::MIN_MATCHES;
-use crate::front::matches::Match;
+use crate::front::matches::SparseMatch;
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
 use crate::threads::prelude::*;
 use std::array::from_fn;
 
-/// By how much both views are smoothed (a standard deviation in pixels), where they share less of their finest detail than this
-/// (open). Of 49 real pairs 37 share 0.7 or more, and all but one 0.57. Of eight clean pairs, noise of 5 levels takes two below
-/// 0.7, noise of 10 all eight, and noise of 20 all below 0.5.
+/// Pairs of shared detail and a standard deviation in pixels: if the views share less of their finest detail,
+/// both are smoothed by that (open). Of 49 real pairs 37 share 0.7 or more, and all but one 0.57. Of eight
+/// clean pairs, noise of 5 levels takes two below 0.7, noise of 10 all eight, and noise of 20 all below 0.5.
 const SMOOTHING: [(f64, f64); 3] = [(0.5, 1.0), (0.57, 0.7), (0.7, 0.5)];
 /// Radius of the patches that are compared, in pixels.
 const RADIUS: usize = 4;
 const SIDE: usize = 2 * RADIUS + 1;
 const PIXELS: usize = SIDE * SIDE;
-/// How far the patch of the right view is moved to either side of where it is expected, in pixels.
+/// The search radius for patches of the right view around their expected position, in pixels.
 const REACH: i32 = 3;
-/// Patches are compared where their disparity is this near to a whole number, in pixels: to interpolate is to smooth.
+/// Patches are compared if their disparity is this close to a whole number, in pixels, because interpolation smooths.
 const NEARLY_WHOLE: f64 = 0.2;
-/// Detail counts up to this many times its median, so that single wrong pixels do not matter: smoothing would spread them.
+/// Detail is clamped to this many times its median, because smoothing would spread single wrong pixels.
 const MAX_DETAIL: i32 = 2;
 
-/// The standard deviation of the Gaussian by which both views are to be smoothed, from matches at half their size; 0 for none.
-pub(super) fn smoothing(pair: &Pair, matches: &[Match]) -> f64 {
+/// The standard deviation by which to smooth both views, from matches at half their size; 0 for none.
+pub(super) fn smoothing(pair: &Pair, matches: &[SparseMatch]) -> f64 {
     let shared = shared_detail(pair, matches);
     let smoothing = SMOOTHING.iter().find(|(least, _)| shared.is_some_and(|shared| shared < *least));
     smoothing.map_or(0.0, |(_, sigma)| *sigma)
 }
 
-/// The correlation of the finest detail of all patches together; `None` where there are too few.
-fn shared_detail(pair: &Pair, matches: &[Match]) -> Option<f64> {
+/// The correlation of the finest detail over all patches; `None` if there are too few.
+fn shared_detail(pair: &Pair, matches: &[SparseMatch]) -> Option<f64> {
     let patches: Vec<_> = matches.par_iter().filter_map(|m| details(pair, m)).collect();
     if patches.len() < MIN_MATCHES {
         return None;
@@ -39,8 +39,8 @@ fn shared_detail(pair: &Pair, matches: &[Match]) -> Option<f64> {
     Some(correlation(all(0), all(1)))
 }
 
-/// The finest detail around a match in the left and the right view, where their patches are a whole number of pixels apart.
-fn details(pair: &Pair, m: &Match) -> Option<[[i32; PIXELS]; 2]> {
+/// The finest detail around a match in the left and the right view, if its disparity is nearly a whole number of pixels.
+fn details(pair: &Pair, m: &SparseMatch) -> Option<[[i32; PIXELS]; 2]> {
     let (x, y) = (2 * m.x, 2 * m.y);
     let left = Patch::new(pair.left(), x, y)?;
     let expected = x as i32 - (2 * m.disparity + FRACTION / 2).div_euclid(FRACTION);
@@ -72,12 +72,12 @@ fn correlation<'a>(a: impl IntoIterator<Item = &'a i32>, b: impl IntoIterator<It
 struct Patch {
     /// Smoothed by a binomial filter of 3 x 3 pixels, less the mean.
     coarse: [i32; PIXELS],
-    /// What that filter takes off.
+    /// The detail that the filter removes.
     fine: [i32; PIXELS],
 }
 
 impl Patch {
-    /// `None` where it leaves the image or holds a masked pixel.
+    /// `None` if the patch leaves the image or contains a masked pixel.
     fn new(image: &Image, x: usize, y: usize) -> Option<Self> {
         const AROUND: usize = RADIUS + 1;
         let (width, height) = image.pixels.size();

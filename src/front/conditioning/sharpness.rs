@@ -1,16 +1,16 @@
-//! Views of different sharpness: one camera is out of focus, or its lens is worse.
+//! Different sharpness: one camera is out of focus, or has a worse lens.
 
 use crate::front::filter::{smooth, smoothed};
 use crate::image::{Image, Pair};
 
 /// The standard deviations by which a view may be smoothed, in pixels.
 const SIGMAS: [f64; 12] = [0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.8, 3.4];
-/// Views are equally sharp where the detail of one is at least this share of the other's (open): so are those of all of 49 real
-/// pairs. Where one view of eight of them is blurred by 1.5 px, none is.
+/// Views are equally sharp if the detail of one is at least this share of the other's (open). That holds for
+/// all of 49 real pairs, and for none of eight of them after blurring one view by 1.5 px.
 const EQUAL: f64 = 0.7;
 
-/// The standard deviations by which the left and the right view are to be smoothed to be equally sharp: 0 for one of them at least. The
-/// pair is given at half its size, too.
+/// The standard deviations by which to smooth the left and the right view for equal sharpness; at least one
+/// is 0. `halves` is the pair at half its size.
 pub(super) fn smoothing(pair: &Pair, halves: &Pair) -> [f64; 2] {
     let (left, right) = (detail(halves.left()), detail(halves.right()));
     if right < EQUAL * left {
@@ -22,7 +22,7 @@ pub(super) fn smoothing(pair: &Pair, halves: &Pair) -> [f64; 2] {
     }
 }
 
-/// The standard deviation that leaves a view the detail nearest to `wanted`, by ratio.
+/// The standard deviation that brings the detail of a view closest to `wanted`, by ratio.
 fn blur(view: &Image, wanted: f64) -> f64 {
     let details = |sigma: f64| detail(&smoothed(view, sigma).downsampled());
     let after = SIGMAS.partition_point(|&sigma| details(sigma) > wanted).clamp(1, SIGMAS.len() - 1);
@@ -30,14 +30,14 @@ fn blur(view: &Image, wanted: f64) -> f64 {
     if wanted * wanted > details(less) * details(more) { less } else { more }
 }
 
-/// The energy of the detail of an image at half its size, where noise hardly counts, relative to that at a quarter. So gain and
-/// contrast do not count either.
+/// The energy of the detail of an image at half its size, where noise hardly counts, relative to that at a
+/// quarter. The ratio is independent of gain and contrast.
 fn detail(half: &Image) -> f64 {
     let coarse = energy(&half.downsampled());
     if coarse > 0 { energy(half) as f64 / coarse as f64 } else { 0.0 }
 }
 
-/// The sum of the squared differences of grey from that around it.
+/// The sum of the squared differences between grey and its local mean.
 fn energy(image: &Image) -> u64 {
     let grey = image.pixels.map(|pixel| pixel[3]);
     let around = smooth(&grey, &image.masked, 1.0);

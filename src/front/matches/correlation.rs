@@ -24,8 +24,8 @@ pub(super) fn correlation(
     scores
 }
 
-/// The scores of windows with these products, by the sum and the norm of the one and of each of the others. All but the last division is
-/// exact, since nothing reaches 2^53.
+/// Scores of windows with these products, from the sums and norms of the template and of each window. All but
+/// the last division is exact, since nothing reaches 2^53.
 #[pulp::with_simd(scores_along = crate::vectors::widest())]
 #[inline(always)]
 fn scores_along_on<'a, S: pulp::Simd>(
@@ -62,7 +62,7 @@ fn products_along_on<'a, S: pulp::Simd>(
     }
 }
 
-/// The same at `N` positions from `first` on; so few sums stay in registers.
+/// The products at `N` positions from `first` on; so few sums stay in registers.
 #[inline(always)]
 fn products_at<const N: usize>(
     template: &[[i16; WINDOW]; WINDOW],

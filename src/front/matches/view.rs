@@ -1,4 +1,4 @@
-//! What a search needs of each view: grey values, sums over windows, and the structure tensor.
+//! Data of a view for the search: grey values, sums over windows, and the structure tensor.
 
 use crate::image::{Image, Plane};
 use crate::threads::prelude::*;
@@ -33,7 +33,7 @@ impl View {
         let grey = image.pixels.map(|p| (p[3] >> GREY_SHIFT) as i16);
         let (width, height) = grey.size();
         let any_masked = image.any_masked();
-        // One allocation each: rows of a large image that are freed one by one may stay with the process.
+        // One allocation each: freed rows of a large image may stay with the process.
         let (mut sums, mut norms) = (Plane::filled(width, height, 0), Plane::filled(width, height, 0.0));
         let rows = sums.data_mut().par_chunks_mut(width).zip(norms.data_mut().par_chunks_mut(width));
         rows.enumerate().for_each(|(y, (sums, norms))| {

@@ -1,6 +1,6 @@
 //! The bank of Gabor filters, in the frequency domain.
 //!
-//! The image is continued by reflection. This makes it periodic with twice its size, and leaves no step at
+//! The image is continued by reflection, which makes it periodic with twice its size and leaves no step at
 //! its borders. One transform of that period serves all filters. A filter passes a Gaussian around its centre
 //! frequency. Only that part of the spectrum is transformed back, shifted to frequency 0, which changes the
 //! phase of the response but not its magnitude. The magnitude is therefore sampled at only as many nodes as
@@ -112,7 +112,7 @@ impl Spectrum {
             let values = |x: usize| Lanes(group.map(|row: &[f32]| row[x]));
             lanes.clear();
             lanes.extend(
-                (0..width).chain((0..width).rev()).map(|x| Complex { re: values(x), im: Lanes::of(0.0) }),
+                (0..width).chain((0..width).rev()).map(|x| Complex { re: values(x), im: Lanes::splat(0.0) }),
             );
             across.process(lanes);
             for (i, out) in out.chunks_exact_mut(2 * width).enumerate() {

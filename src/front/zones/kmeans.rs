@@ -8,7 +8,7 @@
 use crate::options::ZoneExtent;
 use crate::threads::prelude::*;
 
-/// Points that a thread takes at a time.
+/// Points per task.
 const CHUNK: usize = 512;
 
 /// The parameters of the segmentation.
@@ -50,12 +50,12 @@ pub(super) fn cluster(points: &[i16], dimensions: usize, count: usize, options: 
         .expect("there is a replicate")
 }
 
-/// Centroids, and how far they are apart.
+/// Centroids, and their distances.
 pub(super) struct Centroids {
     dimensions: usize,
-    /// One after the other.
+    /// The centroids, concatenated.
     values: Vec<i16>,
-    /// Of each centroid all others, nearest first, with the squared distance.
+    /// For each centroid the others, nearest first, with the squared distance.
     others: Vec<Vec<(u32, usize)>>,
 }
 
@@ -114,7 +114,7 @@ pub(super) fn assign_on<'a, S: pulp::Simd>(
     sum
 }
 
-/// For values up to 512 in size: a square fits in 20 bits.
+/// For values up to 512 in size, whose squared differences fit in 20 bits.
 #[inline(always)]
 fn squared_distance(a: &[i16], b: &[i16]) -> u32 {
     let square = |(a, b): (&i16, &i16)| {
@@ -149,7 +149,7 @@ fn starts(points: &[i16], dimensions: usize, count: usize, random: &mut Random) 
     centroids
 }
 
-/// Lowers the distance of each point to the one from `centroid`.
+/// Lowers the distance of each point to that from `centroid`.
 #[pulp::with_simd(approach = crate::vectors::widest())]
 #[inline(always)]
 fn approach_on<'a, S: pulp::Simd>(_: S, points: &'a [i16], centroid: &'a [i16], distances: &'a mut [u32]) {
@@ -225,7 +225,7 @@ impl Random {
 mod tests {
     use super::*;
 
-    /// Three clusters of 50 points each, far apart.
+    /// Three separate clusters of 50 points each.
     fn heaps() -> Vec<i16> {
         let mut random = Random(7);
         let mut near = |centre: i16| centre + random.below(21) as i16 - 10;
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn heaps_are_told_apart_and_centroids_are_their_means() {
+    fn separate_clusters_are_found_with_their_means() {
         let points = heaps();
         let centroids = cluster(&points, 2, 3, &Options::default());
         assert_eq!(centroids.others.len(), 3);

@@ -1,4 +1,4 @@
-//! Numbers side by side, so that one transform processes several rows or columns with vectors.
+//! Numbers side by side, so that one transform processes several rows or columns with vector instructions.
 //!
 //! Each lane goes through the operations of a single transform, in the same order, and ends with the same bits.
 
@@ -18,8 +18,8 @@ pub(super) const LANES: usize = if cfg!(target_arch = "wasm32") { 1 } else { 4 }
 pub(super) struct Lanes(pub(super) [f32; LANES]);
 
 impl Lanes {
-    /// The same number in each lane.
-    pub(super) fn of(value: f32) -> Self {
+    /// `value` in every lane.
+    pub(super) fn splat(value: f32) -> Self {
         Self([value; LANES])
     }
 
@@ -72,7 +72,7 @@ impl Neg for Lanes {
 impl Zero for Lanes {
     #[inline(always)]
     fn zero() -> Self {
-        Self::of(0.0)
+        Self::splat(0.0)
     }
 
     fn is_zero(&self) -> bool {
@@ -83,31 +83,31 @@ impl Zero for Lanes {
 impl One for Lanes {
     #[inline(always)]
     fn one() -> Self {
-        Self::of(1.0)
+        Self::splat(1.0)
     }
 }
 
 impl FromPrimitive for Lanes {
     fn from_i64(n: i64) -> Option<Self> {
-        f32::from_i64(n).map(Self::of)
+        f32::from_i64(n).map(Self::splat)
     }
 
     fn from_u64(n: u64) -> Option<Self> {
-        f32::from_u64(n).map(Self::of)
+        f32::from_u64(n).map(Self::splat)
     }
 
     fn from_f64(n: f64) -> Option<Self> {
-        f32::from_f64(n).map(Self::of)
+        f32::from_f64(n).map(Self::splat)
     }
 }
 
-// The transforms ask for these two, and use nothing of them.
+// The transforms require these two traits, but do not use them.
 
 impl Num for Lanes {
     type FromStrRadixErr = <f32 as Num>::FromStrRadixErr;
 
     fn from_str_radix(text: &str, radix: u32) -> Result<Self, Self::FromStrRadixErr> {
-        f32::from_str_radix(text, radix).map(Self::of)
+        f32::from_str_radix(text, radix).map(Self::splat)
     }
 }
 
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_lane_has_the_bits_of_a_single_transform() {
-        // Large factors go another way than small ones.
+        // Large factors take a different code path from small ones.
         for length in [1, 2, 30, 194, 450, 2 * 149] {
             let value = |i: usize| ((i * 7919) % 1013) as f32 / 13.0 - 30.0;
             let number =

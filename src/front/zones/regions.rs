@@ -2,7 +2,7 @@
 
 use crate::image::Plane;
 
-/// The zone of masked pixels. It is not counted.
+/// The zone of masked pixels, which does not count.
 pub const MASKED: u32 = u32::MAX;
 
 /// A segmentation.
@@ -14,15 +14,15 @@ pub struct Zones {
     pub count: usize,
 }
 
-/// The connected regions of `clusters`: pixels are of one region where a path of neighbours (above, below, left, right) of
-/// the same cluster joins them. What is [`MASKED`] stays so.
+/// The connected regions of `clusters`: two pixels are in one region if a path of neighbours (above, below,
+/// left, right) of the same cluster joins them. [`MASKED`] pixels stay masked.
 #[must_use]
 pub fn connected(clusters: &Plane<u32>) -> Zones {
     let (width, height) = clusters.size();
     let mut map = Plane::filled(width, height, MASKED);
     let mut count = 0;
     let mut edge = Vec::new();
-    // Every pixel that still has no region is the first one of the next.
+    // A pixel that has no region yet starts the next one.
     for first in 0..width * height {
         let cluster = clusters.data()[first];
         if cluster == MASKED || map.data()[first] != MASKED {

@@ -1,11 +1,11 @@
-//! Whether the coded data of a JPEG file is as long as its pixels take. The decoder fills in what is missing and leaves out what is too
-//! much, and says neither. Only lengths are followed here: no coefficient is computed.
+//! Checks that the coded data of a JPEG file has the length that its pixels need. The decoder silently fills
+//! in missing data and ignores excess data. Only lengths are decoded here, not coefficients.
 
-/// Bytes that may be left over before a marker: some cameras put one there, and their images are sound.
+/// Bytes that may follow the data of a scan: some cameras add one, and their images are sound.
 const SPARE: usize = 1;
 
-/// What is wrong with the coded data of a file that has been decoded, in words that go after those that name the data; `None` where it is as it should be,
-/// or of a kind that is not followed.
+/// The damage to the coded data of a file that was decoded, as the end of a sentence about that data; `None`
+/// if it is sound or of an unsupported kind.
 pub(super) fn damage(bytes: &[u8]) -> Option<String> {
     let mut file = File { bytes, at: 2, ..File::default() };
     loop {
@@ -21,14 +21,14 @@ pub(super) fn damage(bytes: &[u8]) -> Option<String> {
     }
 }
 
-/// What comes next in a file.
+/// The next segment of a file.
 enum Segment {
     Scan,
     End,
     Other,
 }
 
-/// Why a scan is not followed to its end.
+/// Why a scan could not be followed to its end.
 enum Fault {
     Unknown,
     Damage(String),
@@ -47,40 +47,40 @@ struct File<'a> {
     bytes: &'a [u8],
     at: usize,
     progressive: bool,
-    /// (width, height) of the image in the units of which a scan of all components takes one at a time.
+    /// (width, height) of the image in units of interleaved blocks of all components.
     units: (usize, usize),
     components: Vec<Component>,
-    /// The codes of the first coefficients and of the others, by their numbers.
+    /// The tables of first coefficients and of the others, by number.
     tables: [[Option<Table>; 4]; 2],
     /// Units between two restart markers; 0 for none.
     interval: usize,
-    /// What the next scan holds.
+    /// The header of the next scan.
     scan: Scan,
 }
 
 #[derive(Default)]
 struct Component {
     id: u8,
-    /// Blocks of a unit, across and down.
+    /// Blocks per unit, horizontally and vertically.
     sampling: (usize, usize),
-    /// Blocks with pixels of the image, across and down.
+    /// Blocks with pixels of the image, horizontally and vertically.
     blocks: (usize, usize),
-    /// Of each block, which coefficients are not 0 so far: later scans of a progressive file say more about these.
+    /// For each block, which coefficients are nonzero so far: later scans of a progressive file refine these.
     known: Vec<u64>,
 }
 
 #[derive(Clone, Default)]
 struct Scan {
-    /// Components, each with its two tables.
+    /// Components, each with the numbers of its two tables.
     parts: Vec<(usize, [usize; 2])>,
     /// The first and the last coefficient.
     band: (usize, usize),
-    /// Whether it says more about what is known.
+    /// Whether it refines known coefficients.
     refines: bool,
 }
 
 impl<'a> File<'a> {
-    /// Takes the next segment, of a scan its head; `None` where none is left.
+    /// Reads the next segment, or the header of a scan; `None` at the end of the file.
     fn segment(&mut self) -> Option<Segment> {
         while *self.bytes.get(self.at)? != 0xff || matches!(self.bytes.get(self.at + 1)?, 0 | 0xff) {
             self.at += 1;
@@ -90,7 +90,7 @@ impl<'a> File<'a> {
         if marker == 0xd9 {
             return Some(Segment::End);
         }
-        // These have no length.
+        // Markers without a length.
         if matches!(marker, 0x01 | 0xd0..=0xd8) {
             return Some(Segment::Other);
         }
@@ -99,7 +99,7 @@ impl<'a> File<'a> {
         self.at += length;
         match marker {
             0xc0..=0xc2 => self.frame(body, marker == 0xc2)?,
-            // Arithmetic codes, and files without loss.
+            // Arithmetic coding, and lossless files.
             0xc3 | 0xc5..=0xc7 | 0xc9..=0xcb | 0xcd..=0xcf => return None,
             0xc4 => self.codes(body)?,
             0xdd => self.interval = word(body)?,
@@ -159,10 +159,10 @@ impl<'a> File<'a> {
         makes_sense.then_some(Scan { parts, band, refines: self.progressive && bits >> 4 != 0 })
     }
 
-    /// Follows the data of the scan, up to the marker behind it.
+    /// Follows the data of the scan up to the next marker.
     fn scan(&mut self) -> Result<()> {
         let scan = std::mem::take(&mut self.scan);
-        // A single component has no blocks beyond the image.
+        // A scan of a single component has no blocks beyond the image.
         let alone = match scan.parts[..] {
             [(one, _)] => Some(self.components[one].blocks),
             _ => None,
@@ -202,7 +202,7 @@ impl<'a> File<'a> {
         bits.end()
     }
 
-    /// The coded data from here to the next marker, at which the file then is.
+    /// The coded data up to the next marker, to which the file position moves.
     fn coded(&mut self) -> Bits<'a> {
         let rest = &self.bytes[self.at..];
         let is_marker = |pair: &[u8]| pair[0] == 0xff && pair[1] != 0 && pair[1] != 0xff;
@@ -216,11 +216,11 @@ fn word(bytes: &[u8]) -> Option<usize> {
     bytes.first_chunk().map(|two| u16::from_be_bytes(*two).into())
 }
 
-/// A code of Huffman's.
+/// A Huffman table.
 struct Table {
-    /// By the next eight bits: how many of them a code takes, and its value; a length of 0 where it takes more.
+    /// By the next eight bits: the length and the value of the code; a length of 0 if the code is longer.
     short: [(u8, u8); 256],
-    /// For each length: the first code beyond those of that length, as 16 bits, and where its values begin, less its first code.
+    /// For each length: the end of its codes as 16 bits, and the index of its first value minus its first code.
     longer: [(u32, i32); 17],
     values: Vec<u8>,
 }
@@ -249,14 +249,14 @@ impl Table {
     }
 }
 
-/// Coded data, bit by bit.
+/// Reads coded data bit by bit.
 struct Bits<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// The next bits, the first one highest, and how many there are.
+    /// The next bits, the first one highest, and their number.
     buffer: u64,
     count: u32,
-    /// How many of these are behind the end of the data.
+    /// How many of these are beyond the end of the data.
     missing: u32,
 }
 
@@ -264,7 +264,7 @@ impl Bits<'_> {
     fn fill(&mut self) {
         while self.count <= 56 {
             let byte = if let Some(byte) = self.bytes.get(self.at) {
-                // A 0 behind it says that it is no marker.
+                // A stuffed 0 follows a byte 0xff that is not a marker.
                 self.at += if *byte == 0xff { 2 } else { 1 };
                 *byte
             } else {
@@ -306,17 +306,17 @@ impl Bits<'_> {
         value.copied().ok_or_else(|| self.fault("it has a code without a meaning"))
     }
 
-    /// What is wrong: behind the end of the data nothing makes sense.
+    /// A fault of the data; after its end, the fault is that it ended early.
     fn fault(&self, reason: &str) -> Fault {
         Fault::damage(if self.ended_early() { "it ends before the pixels do" } else { reason })
     }
 
-    /// Whether more was taken than there is.
+    /// Whether bits beyond the end of the data were read.
     fn ended_early(&self) -> bool {
         self.missing > self.count
     }
 
-    /// The block of a file that is not progressive.
+    /// Follows a block of a baseline file.
     fn block(&mut self, [first, others]: [Option<&Table>; 2]) -> Result<()> {
         let (Some(first), Some(others)) = (first, others) else { return Err(Fault::Unknown) };
         let bits = self.code(first)?;
@@ -341,7 +341,8 @@ impl Bits<'_> {
         Ok(())
     }
 
-    /// The block of a scan of a progressive file, of which some coefficients are `known`; `run` is how many blocks are still without any.
+    /// Follows a block in a scan of a progressive file. The coefficients in `known` are nonzero; `run` is the
+    /// number of blocks still to come without new ones.
     fn progressive_block(
         &mut self,
         [first, others]: [Option<&Table>; 2],
@@ -364,7 +365,7 @@ impl Bits<'_> {
                 break;
             }
             self.take(bits);
-            // What is known is no zero that counts, and has a bit of its own.
+            // Known coefficients do not count as zeros, and have a correction bit each.
             while at <= end {
                 if scan.refines && *known & 1 << at != 0 {
                     self.take(1);
@@ -390,7 +391,7 @@ impl Bits<'_> {
         Ok(())
     }
 
-    /// Takes the bits of a first coefficient.
+    /// Skips the bits of a first coefficient.
     fn bits_of_first(&mut self, bits: u8) -> Result<()> {
         if bits > 11 {
             return Err(self.fault("a block of it has a coefficient that cannot be"));
@@ -399,7 +400,7 @@ impl Bits<'_> {
         Ok(())
     }
 
-    /// Refuses what is left before the marker.
+    /// Fails if data is left before the marker.
     fn end(&self) -> Result<()> {
         if self.ended_early() {
             return Err(Fault::damage("it ends before the pixels do"));
@@ -417,8 +418,8 @@ impl Bits<'_> {
 mod tests {
     use super::*;
 
-    /// A file of one grey component in blocks of 8 x 8. The code 0 stands for a first coefficient that stays as it is; of the others, 0 ends
-    /// a block and 10 stands for one of a single bit.
+    /// A file of one grey component in blocks of 8 x 8. The code 0 is a first coefficient without change; of
+    /// the others, 0 ends a block, and 10 is a coefficient of one bit.
     fn file(frame: u8, width: u8, interval: u8, scans: &[([u8; 3], &[u8])]) -> Vec<u8> {
         let mut bytes = vec![0xff, 0xd8];
         let mut segment = |marker: u8, body: &[u8], data: &[u8]| {
@@ -447,7 +448,7 @@ mod tests {
     }
 
     #[test]
-    fn sound_data_is_as_long_as_its_pixels_take() {
+    fn sound_data_has_the_length_of_its_pixels() {
         let restarts = [0x3f, 0xff, 0xd0, 0x3f];
         for sound in [whole(16, 0, &[0x0f]), whole(16, 0, &[0x0f, 7]), whole(16, 1, &restarts)] {
             assert!(super::super::decode(&sound, 1 << 20).is_ok());
@@ -459,7 +460,7 @@ mod tests {
         is_damaged(&whole(16, 0, &[0xff, 0]), "a code without a meaning");
         is_damaged(&whole(16, 1, &[0x0f]), "a restart marker is not where it should be");
         is_damaged(&whole(16, 1, &[0x3f, 0xff, 0xd1, 0x3f]), "a restart marker");
-        // A block of 63 more coefficients is full, and one of 64 is none: 101 for each.
+        // A block of 63 more coefficients, 101 each, is full; one with more is invalid.
         let coefficients = |count: usize| {
             let bits = std::iter::once(0).chain([1, 0, 1].into_iter().cycle().take(3 * count)).chain([1; 7]);
             let bits: Vec<u8> = bits.collect();
@@ -471,9 +472,9 @@ mod tests {
         is_damaged(&whole(8, 0, &coefficients(80)), "bytes of it belong to no pixel");
     }
 
-    /// Where a later scan says more about what is known, each known coefficient has a bit of its own.
+    /// A refining scan has a correction bit for each known coefficient.
     #[test]
-    fn scans_that_refine_know_what_came_before() {
+    fn refining_scans_know_earlier_coefficients() {
         let progressive = |last: &[u8]| {
             let scans = [([0, 0, 0], &[0; 3][..]), ([1, 63, 0x01], &[0xaa; 12]), ([1, 63, 0x10], last)];
             file(0xc2, 192, 0, &scans)
@@ -485,9 +486,9 @@ mod tests {
         is_damaged(&progressive(&[0x55; 8]), "2 bytes of it");
     }
 
-    /// Whatever the bytes are, nothing panics.
+    /// No bytes cause a panic.
     #[test]
-    fn damaged_heads_are_no_harm() {
+    fn damaged_headers_do_no_harm() {
         let files = [whole(16, 1, &[0x3f, 0xff, 0xd0, 0x3f]), file(0xc2, 16, 0, &[([0, 0, 0], &[0x3f])])];
         for sound in files {
             for at in 0..sound.len() {

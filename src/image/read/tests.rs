@@ -123,7 +123,7 @@ fn an_8_bit_pair_times_257_is_the_same_pair() {
             assert_eq!(pair(left, right, None).unwrap(), twice(&byte));
         }
     }
-    // Negative control: 256 is no stretching, and one more is a different picture.
+    // Negative control: 256 is not a stretched value, and one more is a different picture.
     let byte = f.grey8("byte.png", RAMP);
     let mut values = RAMP.map(stretched);
     values[4] += 1;
@@ -138,7 +138,7 @@ fn words_use_the_whole_range() {
     {
         let path = f.grey16("a.png", values(max));
         assert_eq!(greys(twice(&path).left()), values(max).map(|v| v << free), "{max}");
-        // The brighter of the two decides for both.
+        // The brighter image determines the shift of both.
         let dim = f.grey16("b.tif", values(max / 5));
         for pair in [pair(&dim, &path, None).unwrap(), pair(&path, &dim, None).unwrap()] {
             let (l, r) = (greys(pair.left()), greys(pair.right()));
@@ -160,26 +160,26 @@ fn an_8_bit_image_with_a_16_bit_one_is_stretched() {
 }
 
 #[test]
-fn each_of_two_views_of_8_and_of_fewer_than_16_bits_fills_its_range() {
+fn views_of_8_bits_and_of_fewer_than_16_bits_both_fill_the_range() {
     let f = Folder::new();
     let byte = f.grey8("byte.png", RAMP);
-    // 12 bits that show the same.
+    // The same picture in 12 bits.
     let word = f.grey16("word.png", RAMP.map(|v| u16::from(v) * 16 + 3));
     for (left, right, bytes) in [(&byte, &word, 0), (&word, &byte, 1)] {
         let pair = pair(left, right, None).unwrap();
         let views = [greys(pair.left()), greys(pair.right())];
         assert_eq!(views[bytes], RAMP.map(stretched));
         assert_eq!(views[1 - bytes], RAMP.map(|v| (u16::from(v) * 16 + 3) << 4));
-        // Half a level apart.
+        // They differ by less than a level.
         assert!(views[0].iter().zip(&views[1]).all(|(l, r)| l.abs_diff(*r) <= 208));
     }
-    // Words with the values of bytes are bytes.
+    // Words with the values of bytes count as bytes.
     let wide = f.grey16("wide.png", RAMP.map(u16::from));
     assert_eq!(pair(&byte, &wide, None).unwrap(), twice(&byte));
 }
 
 #[test]
-fn what_is_masked_influences_nothing() {
+fn masked_pixels_influence_nothing() {
     let f = Folder::new();
     let mask = f.grey8("mask.png", [0, 0, 255, 0, 0, 0, 0, 1, 0, 0, 0, 0]);
     let right = f.grey16("r.png", std::array::from_fn(|i| 100 * i as u16));
@@ -305,7 +305,7 @@ fn float_colours_and_signed_words() {
 }
 
 #[test]
-fn the_content_decides_and_not_the_name() {
+fn the_content_decides_the_kind() {
     let f = Folder::new();
     let expected = f.grey8("a.png", RAMP);
     fs::copy(&expected, f.at("a.jpg")).unwrap();
@@ -318,7 +318,7 @@ fn the_content_decides_and_not_the_name() {
 }
 
 #[test]
-fn jpeg_is_read_and_its_end_is_missed() {
+fn jpeg_is_read_and_truncation_is_found() {
     let f = Folder::new();
     let image = RgbImage::from_fn(64, 48, |x, y| Rgb([x as u8 * 4, y as u8 * 5, 128]));
     let path = f.at("a.jpg");
@@ -332,7 +332,7 @@ fn jpeg_is_read_and_its_end_is_missed() {
 }
 
 #[test]
-fn what_does_not_belong_together_is_refused() {
+fn mismatched_images_are_refused() {
     let f = Folder::new();
     let left = f.grey8("left.png", RAMP);
     let small = f.at("small.png");
@@ -435,7 +435,7 @@ fn damaged_files_never_panic_and_never_lie_about_their_size() {
 }
 
 #[test]
-fn disparities_are_refused_where_their_scale_is_unknown() {
+fn disparities_of_unknown_scale_are_refused() {
     let f = Folder::new();
     for (path, words) in [
         (f.grey8("d.png", RAMP), &["d.png", "whole numbers", "16-bit"][..]),
@@ -466,7 +466,7 @@ fn levels_become_disparities_by_their_scale() {
     for path in [f.grey8("d.pgm", RAMP), f.at("none.png")] {
         assert!(scaled(&path).is_err(), "{}", path.display());
     }
-    // 16 bits may have another scale than that of KITTI, and TIFF has none at all by itself.
+    // The scale of 16 bits may differ from KITTI's, and TIFF has no default.
     for path in [f.grey16("k.png", [9; N]), f.grey16("k.tif", [9; N])] {
         assert_eq!(scaled(&path).unwrap().data(), [3.0; N], "{}", path.display());
     }
@@ -475,8 +475,8 @@ fn levels_become_disparities_by_their_scale() {
     refused(scaled(&path), &["f.pfm", "in pixels", "whole numbers"]);
 }
 
-/// A byte of the coded data of a JPEG file that is another one: the decoder hardly ever notices, and the pair has a doubt that names the
-/// file, but for bits that change nothing of the lengths. A sound file has none.
+/// Changing a byte of the coded data of a JPEG file, which the decoder hardly ever notices, gives a doubt
+/// with the name of the file, unless the lengths do not change. A sound file has no doubt.
 #[test]
 fn damaged_jpeg_data_is_a_doubt() {
     let f = Folder::new();
@@ -501,13 +501,13 @@ fn damaged_jpeg_data_is_a_doubt() {
             "{right:?}"
         );
         (tried, silent) = (tried + 1, silent + usize::from(right.is_none()));
-        // What is made of the pair keeps the doubt.
+        // Derived pairs keep the doubt.
         assert_eq!(pair.crop(&crate::image::Rect::whole((9, 9))).doubts(), pair.doubts());
     }
     assert!(tried > 100 && silent * 2 < tried, "{silent} of {tried}");
 }
 
-/// BMP, as machine vision has it, and arrays of NumPy are read wherever other images are.
+/// BMP, which is common in machine vision, and NumPy arrays are read wherever other images are.
 #[test]
 fn bitmaps_and_arrays_are_read() {
     let f = Folder::new();

@@ -88,7 +88,7 @@ impl Packing<'_> {
         let number =
             |n: usize| u32::try_from(n).map_err(|_| unsupported("a TIFF strip or tile is too large"));
         let (width, height, length) = (number(width)?, number(rows)?, number(data.len())?);
-        // With room for the directory.
+        // Reserve room for the directory.
         let room = data.len() + self.jpeg_tables.map_or(0, <[u8]>::len) + 1024;
         let mut file = Cursor::new(memory::reserved(room)?);
         let mut write = || -> TiffResult<()> {
@@ -154,7 +154,7 @@ impl Packing<'_> {
     }
 }
 
-/// Height, width and components that a JPEG stream claims.
+/// Height, width and number of components that a JPEG stream claims.
 fn jpeg_frame(data: &[u8]) -> Option<[usize; 3]> {
     let mut at = 2;
     loop {
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn differences_are_summed_in_either_order() {
+    fn differences_are_summed_in_either_byte_order() {
         // 1, 300, 65535, 4 and their differences, modulo 2^16.
         let (values, differences) = ([1_u16, 300, 65_535, 4], [1_u16, 299, 65_235, 5]);
         for (order, bytes) in [
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn differences_of_floats_are_of_their_bytes() {
+    fn differences_of_floats_are_undone_by_byte_planes() {
         let values = [1.5_f32, -2.25, 3e7, 0.0];
         let planes: Vec<u8> = (0..4).flat_map(|b| values.map(|v| v.to_be_bytes()[b])).collect();
         let mut stored = planes.clone();

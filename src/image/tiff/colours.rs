@@ -54,7 +54,7 @@ impl Colours {
     ///
     /// # Errors
     /// A description of what is not supported.
-    pub(super) fn of(directory: &Directory) -> Result<Self, ReadError> {
+    pub(super) fn from_directory(directory: &Directory) -> Result<Self, ReadError> {
         let samples = directory.first(Tag::SamplesPerPixel, 1)? as usize;
         let bits = directory.equal(Tag::BitsPerSample, 1, "depths")?;
         if samples == 0 || samples > usize::from(u16::MAX) || !(1..=64).contains(&bits) {

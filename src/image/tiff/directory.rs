@@ -7,7 +7,7 @@ use tiff::tags::{ByteOrder, Tag};
 use crate::error::ReadError;
 use crate::image::file::{damaged, unsupported};
 
-/// Largest number of directories that are read: a file with more is endless.
+/// Most directories that are read, so that an endless file ends.
 const MAX_DIRECTORIES: usize = 1 << 12;
 
 /// A tag, and the position of its values.
@@ -34,7 +34,7 @@ impl<'a> Directory<'a> {
     ///
     /// # Errors
     /// A description of the damage, in one line.
-    pub(super) fn of(file: &'a [u8]) -> Result<Self, ReadError> {
+    pub(super) fn parse(file: &'a [u8]) -> Result<Self, ReadError> {
         let (order, big) = match file {
             [b'I', b'I', kind, 0, ..] => (ByteOrder::LittleEndian, *kind == 43),
             [b'M', b'M', 0, kind, ..] => (ByteOrder::BigEndian, *kind == 43),
@@ -87,13 +87,13 @@ impl<'a> Directory<'a> {
         Ok(Self { file, order, entries, next })
     }
 
-    /// Whether it belongs to an image in full size.
+    /// Whether the directory is of a full-size image.
     fn is_image(&self) -> Result<bool, ReadError> {
         // Bit 0 marks a reduced copy, bit 2 a mask. The older tag has 2 for a reduced copy.
         Ok(self.first(Tag::NewSubfileType, 0)? & 5 == 0 && self.first(Tag::SubfileType, 1)? != 2)
     }
 
-    /// Whether the tag is there.
+    /// Whether the directory has the tag.
     pub(super) fn has(&self, tag: Tag) -> bool {
         self.entries.iter().any(|entry| entry.tag == tag.to_u16())
     }
@@ -118,7 +118,7 @@ impl<'a> Directory<'a> {
         }
     }
 
-    /// The value of a tag that has one for every sample, where all are equal.
+    /// The value of a tag with one value per sample, all of which must be equal.
     pub(super) fn equal(&self, tag: Tag, default: u64, what: &str) -> Result<u64, ReadError> {
         let values = self.unsigned(tag)?.unwrap_or_default();
         let first = values.first().copied().unwrap_or(default);
@@ -128,7 +128,7 @@ impl<'a> Directory<'a> {
         Ok(first)
     }
 
-    /// The values of a tag that holds whole numbers; `None` where there is none.
+    /// The values of a tag that holds whole numbers; `None` if it is absent.
     pub(super) fn unsigned(&self, tag: Tag) -> Result<Option<Vec<u64>>, ReadError> {
         let Some((kind, values)) = self.values(tag)? else { return Ok(None) };
         if !matches!(kind, 1 | 3 | 4 | 13 | 16 | 18) {
@@ -153,7 +153,7 @@ impl<'a> Directory<'a> {
         Ok(self.values(tag)?.map(|(_, values)| values))
     }
 
-    /// The values of a tag that holds fractions of unsigned numbers, or floats.
+    /// The values of a tag that holds unsigned fractions or floats.
     pub(super) fn reals(&self, tag: Tag) -> Result<Option<Vec<f64>>, ReadError> {
         let Some((kind, values)) = self.values(tag)? else { return Ok(None) };
         let real = |value: &[u8]| match kind {

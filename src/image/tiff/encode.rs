@@ -1,4 +1,4 @@
-//! Maps as float TIFF: plain, or in packed tiles where they are large.
+//! Encodes maps as float TIFF: plain, or in compressed tiles if they are large.
 
 use std::io::{self, Cursor, Seek, Write};
 
@@ -13,15 +13,15 @@ use crate::image::georeference::Georeference;
 use crate::threads;
 use crate::threads::prelude::*;
 
-/// Most pixels of a plain map. Few programs cannot read tiles and Deflate, and small maps need neither.
+/// Most pixels of a plain map. A few programs cannot read tiles and Deflate, which small maps do not need.
 const MAX_PLAIN: usize = 1 << 22;
-/// Offsets in plain TIFF end at 4 GiB; this leaves room for the tags. Few programs read BigTIFF, so it is used only where it is
-/// needed.
+/// Limit for plain TIFF, whose offsets end at 4 GiB; this leaves room for the tags. Few programs read
+/// BigTIFF, so it is used only if needed.
 const MAX_BYTES: usize = u32::MAX as usize - (1 << 25);
 /// Width and height of a tile.
 const SIDE: usize = 256;
 
-/// The file of a map, whose values are written as they are; NaN is its no-data value.
+/// Encodes a map, whose values are written unchanged; NaN is the no-data value.
 pub(in crate::image) fn encode(
     map: &Plane<f32>,
     size: (u32, u32),
@@ -39,7 +39,7 @@ pub(in crate::image) fn encode(
     Ok(file.into_inner())
 }
 
-/// Writes what is not about the format of the pixels.
+/// Writes the tags that do not describe the format of the pixels.
 fn annotate<W: Write + Seek, K: TiffKind>(
     directory: &mut DirectoryEncoder<W, K>,
     georeference: Option<&Georeference>,
@@ -53,7 +53,7 @@ fn annotate<W: Write + Seek, K: TiffKind>(
     directory.write_tag(Tag::GdalNodata, "nan")
 }
 
-/// Everything in the file begins at an even offset.
+/// Aligns the file to an even offset.
 fn align<W: Write + Seek, K: TiffKind>(
     directory: &mut DirectoryEncoder<W, K>,
     written: usize,
@@ -64,7 +64,7 @@ fn align<W: Write + Seek, K: TiffKind>(
     Ok(())
 }
 
-/// Writes a file of tiles; BigTIFF where they take more than `max_bytes`.
+/// Writes a file of tiles; BigTIFF if they exceed `max_bytes`.
 fn write_tiles(
     file: &mut Cursor<Vec<u8>>,
     size: (u32, u32),
@@ -118,7 +118,7 @@ fn packed_tiles(map: &Plane<f32>) -> io::Result<Vec<Vec<u8>>> {
     threads::run(|| tiles.map(|i| packed_tile(map, i % across * SIDE, i / across * SIDE)).collect())
 }
 
-/// A tile with the predictor of floats, in Deflate. Beyond the map it holds NaN.
+/// A tile with the predictor of floats, compressed by Deflate. Beyond the map it holds NaN.
 fn packed_tile(map: &Plane<f32>, left: usize, top: usize) -> io::Result<Vec<u8>> {
     let right = map.width().min(left + SIDE);
     let mut bytes = Vec::with_capacity(SIDE * SIDE * size_of::<f32>());
@@ -136,7 +136,7 @@ fn packed_tile(map: &Plane<f32>, left: usize, top: usize) -> io::Result<Vec<u8>>
     Ok(packed)
 }
 
-/// The differences between the bytes of a row of floats, which lie in planes, the highest byte first.
+/// The differences between the bytes of a row of floats, in planes, the highest byte first.
 fn predict(row: &[f32], bytes: &mut Vec<u8>) {
     let start = bytes.len();
     for place in 0..size_of::<f32>() {
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn tiles_come_back_as_they_went() {
+    fn tiles_survive_a_round_trip() {
         for (width, height) in [(1, 1), (256, 256), (257, 255), (600, 513)] {
             let map = map(width, height);
             let bits: Vec<u32> = map.data().iter().map(|v| v.to_bits()).collect();

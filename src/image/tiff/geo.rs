@@ -15,11 +15,11 @@ const TAGS: [(Tag, Type); 7] = [
     (Tag::GeoAsciiParamsTag, Type::ASCII),
     (RATIONAL_POLYNOMIALS, Type::DOUBLE),
 ];
-/// Most bytes of a tag: room for twenty thousand tie points.
+/// Most bytes of a tag: enough for twenty thousand tie points.
 const MAX_BYTES: usize = 1 << 20;
 
-/// The georeference that the directory declares. One with a tag of another type, of no value, beyond the end of the file, or of
-/// more than [`MAX_BYTES`] bytes is none: the rest of it would place the image elsewhere.
+/// The georeference that the directory declares. It is dropped if a tag has another type, no value, more than
+/// [`MAX_BYTES`] bytes, or leaves the file: the remaining tags would place the image elsewhere.
 pub(super) fn georeference(directory: &Directory) -> Option<Georeference> {
     let there = TAGS.iter().filter(|(tag, _)| directory.has(*tag));
     let fields: Vec<Field> = there.map(|&(tag, kind)| field(directory, tag, kind)).collect::<Option<_>>()?;

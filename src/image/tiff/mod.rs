@@ -27,7 +27,7 @@ use crate::error::ReadError;
 use crate::memory;
 use crate::text::quoted;
 
-/// How samples are numbers.
+/// The number type of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Unsigned,
@@ -46,10 +46,10 @@ struct Layout<'a> {
     planar: bool,
     /// Width and height of a strip or tile.
     chunk: (usize, usize),
-    /// Position of each strip or tile, and its size where the file gives one.
+    /// Position of each strip or tile, and its size if the file gives one.
     offsets: Vec<u64>,
     byte_counts: Option<Vec<u64>>,
-    /// Columns and rows that share a pair of chroma samples, where chroma is subsampled.
+    /// Columns and rows that share a pair of chroma samples, if chroma is subsampled.
     subsampling: Option<(usize, usize)>,
     packing: Packing<'a>,
 }
@@ -64,15 +64,15 @@ pub(super) fn decode(
     max_pixels: u64,
     no_data: Option<f64>,
 ) -> Result<Raster<'static>, ReadError> {
-    let directory = Directory::of(file)?;
-    let colours = Colours::of(&directory)?;
-    let layout = Layout::of(&directory, &colours, file.len(), max_pixels)?;
+    let directory = Directory::parse(file)?;
+    let colours = Colours::from_directory(&directory)?;
+    let layout = Layout::from_directory(&directory, &colours, file.len(), max_pixels)?;
     let no_data = no_data.map_or_else(|| no_data_of(&directory), |value| Ok(Some(value)))?;
     let samples = layout.samples(file, no_data.unwrap_or(0.0))?;
     let no_data = no_data.map(|value| holding(&samples, layout.read, colours.stored(), value)).transpose()?;
     let (channels, samples) = colours.levels(samples)?;
     let georeference = geo::georeference(&directory);
-    // A damaged tag says nothing of the pixels.
+    // Ignore a damaged orientation tag, which does not affect the pixels.
     let orientation = Orientation::of_tag(directory.first(Tag::Orientation, 1).unwrap_or(1));
     Ok(Raster {
         no_data,
@@ -87,14 +87,14 @@ fn no_data_of(directory: &Directory) -> Result<Option<f64>, ReadError> {
     let Some(text) = directory.text(Tag::GdalNodata)? else { return Ok(None) };
     match text.parse() {
         Ok(value) => Ok(Some(value)),
-        // Some programs write it like this.
+        // Some programs write an empty tag.
         Err(_) if text.is_empty() => Ok(None),
         Err(_) => Err(ReadError::NoData { value: quoted(&text) }),
     }
 }
 
 impl<'a> Layout<'a> {
-    fn of(
+    fn from_directory(
         directory: &Directory<'a>,
         colours: &Colours,
         file_bytes: usize,
@@ -107,7 +107,7 @@ impl<'a> Layout<'a> {
 
         let bits = colours.bits;
         let format = match directory.equal(Tag::SampleFormat, 1, "formats")? {
-            // 4 is undefined: there are bits, and unsigned is the best guess.
+            // Format 4 is undefined; unsigned is the best guess.
             1 | 4 => Format::Unsigned,
             2 => Format::Signed,
             3 => Format::Float,
@@ -151,7 +151,7 @@ impl<'a> Layout<'a> {
         let predictor = match directory.first(Tag::Predictor, 1)? {
             1 => 1,
             _ if compression == chunks::JPEG => 1,
-            // Some readers ignore the predictor then, as libtiff does, and others do not.
+            // Readers disagree: libtiff, for one, ignores the predictor in this case.
             _ if !matches!(compression, 5 | 8 | 32_946) => {
                 return Err(unsupported("names a predictor, and is not packed by LZW or Deflate"));
             }
@@ -232,7 +232,7 @@ impl<'a> Layout<'a> {
         Ok(Self { width, height, format, read, planar, chunk, offsets, byte_counts, subsampling, packing })
     }
 
-    /// The samples that are read, of all pixels; `missing` where the file leaves out a strip or tile.
+    /// All samples that are read; `missing` fills strips or tiles that the file omits.
     fn samples(&self, file: &[u8], missing: f64) -> Result<Samples<'static>, ReadError> {
         let (order, bits) = (self.packing.order, self.packing.bits);
         let size = bits as usize / 8;
@@ -285,7 +285,7 @@ impl<'a> Layout<'a> {
             }
             let bytes = self.byte_counts.as_ref().map(|counts| counts[i]);
             if bytes == Some(0) {
-                // GDAL leaves out tiles that hold only no data.
+                // GDAL omits tiles without data.
                 continue;
             }
             let (left, top) = (place % across * self.chunk.0, place / across * self.chunk.1);
@@ -297,7 +297,7 @@ impl<'a> Layout<'a> {
             if end > data.len() {
                 return Err(damaged("the TIFF pixels end behind the end of the file"));
             }
-            // Without compression the size is known, and the file's byte counts may be wrong.
+            // Without compression the size is known, even if the file's byte counts are wrong.
             let data = if self.packing.compression == chunks::UNCOMPRESSED { data } else { &data[..end] };
             let stored =
                 self.packing.rows(data, rows.div_ceil(self.subsampling.map_or(1, |(_, down)| down)))?;

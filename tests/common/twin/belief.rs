@@ -8,7 +8,7 @@ pub fn belief_most(plan: &Plan) -> u32 {
     most(plan) - u32::from(plan.dependency.tau.max(plan.resolution.tau))
 }
 
-/// Beliefs of `level`; `down` and `up` are empty where there is no coarser or finer level.
+/// Beliefs of `level`; `down` and `up` are empty if there is no coarser or finer level.
 pub fn belief(
     plan: &Plan,
     level: usize,

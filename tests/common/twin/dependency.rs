@@ -3,7 +3,7 @@ use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::Plan;
 use std::ops::Range;
 
-/// New messages of the dependency factors of `level`, between pixels that have the labels `has`.
+/// New messages of the dependency factors of `level`, between pixels with the labels `has`.
 pub fn dependency(
     plan: &Plan,
     level: usize,
@@ -58,7 +58,7 @@ pub fn dependency(
     out
 }
 
-/// The sums where labels that differ by one cost `step`, between labels that `count`.
+/// The sums after allowing steps to adjacent labels at the cost `step`, among labels that `counts` accepts.
 fn with_steps(s: &[i64], counts: impl Fn(usize) -> bool, step: u16) -> Vec<i64> {
     let near = |d: usize| {
         let next = [d.checked_sub(1), Some(d + 1)].into_iter().flatten();
@@ -68,8 +68,8 @@ fn with_steps(s: &[i64], counts: impl Fn(usize) -> bool, step: u16) -> Vec<i64> 
     (0..s.len()).map(near).collect()
 }
 
-/// Marks what is not defined in dependency messages: labels that a member does not have, and in slots that no messages
-/// come from, those that the factor's own pixel does not have.
+/// Marks undefined dependency messages: labels that a member does not have and, in empty slots, labels that
+/// the factor's own pixel does not have.
 pub fn undefine(plan: &Plan, level: usize, graph: &LevelGraph, has: &[Range<usize>], messages: &mut [u32]) {
     let labels = plan.levels[level].labels;
     for (i, row) in messages.chunks_mut(labels).enumerate() {

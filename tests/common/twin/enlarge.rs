@@ -4,12 +4,12 @@ use mrfgs::low_level::backend::Map;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::{flag, has_disparity};
 
-/// What decides at edges.
+/// Parameters of the enlargement at edges.
 #[derive(Clone, Copy)]
 pub struct Edges {
-    /// A pixel away, in levels.
+    /// The penalty of a pixel of distance, in levels.
     pub away: i64,
-    /// Levels by which a pixel may be more unlike and still count.
+    /// The excess dissimilarity, in levels, up to which a pixel still counts.
     pub near: i64,
     /// The span of disparities without an edge, in 1/256 px.
     pub flat: i64,
@@ -19,12 +19,12 @@ impl Edges {
     pub const DEFINED: Self = Self { away: 8, near: 64, flat: 256 };
 }
 
-/// The maps at full size; `pair` knows that size.
+/// The maps at full size; `pair` has that size as its full one.
 pub fn enlarge(plan: &Plan, pair: &Pair, maps: &Finest) -> Vec<(Map, Plane<i32>)> {
     enlarge_by(&Edges::DEFINED, plan, pair, maps)
 }
 
-/// The same by other edges.
+/// Like [`enlarge`], with other parameters.
 pub fn enlarge_by(edges: &Edges, plan: &Plan, pair: &Pair, maps: &Finest) -> Vec<(Map, Plane<i32>)> {
     let full = pair.full().unwrap().left();
     let range = plan.of_pair().range;
@@ -33,7 +33,7 @@ pub fn enlarge_by(edges: &Edges, plan: &Plan, pair: &Pair, maps: &Finest) -> Vec
     let within =
         |half: i32| (2 * i64::from(half)).clamp(256 * i64::from(range.min), 256 * i64::from(range.max));
     let d = |at: (usize, usize)| within(maps.disparity[at]);
-    // Disparity, and the pixel whose flags count.
+    // Disparity, and the pixel that provides the flags.
     let at_full = |x: usize, y: usize| -> (i64, (usize, usize)) {
         let own = (x / 2, y / 2);
         if !known(own) || full.masked[(x, y)] {

@@ -2,7 +2,7 @@ use super::{UNDEFINED, most};
 use mrfgs::low_level::plan::Plan;
 use std::ops::Range;
 
-/// Evidence of `level` from its cost, for pixels that have the labels `has`.
+/// Evidence of `level` from its cost, for pixels with the labels `has`.
 pub fn evidence(plan: &Plan, level: usize, has: &[Range<usize>], cost: &[u32]) -> Vec<u32> {
     let l = &plan.levels[level];
     let unit = if level == 0 { 256 } else { 1 };

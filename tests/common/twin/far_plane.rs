@@ -13,7 +13,7 @@ use mrfgs::options::{Fill, MatchSize};
 /// A patch: column and row.
 type Patch = (usize, usize);
 
-/// Moments: the weight, and by pairs of x, y and disparity; `mean` has the means of these three.
+/// Moments: the weight, the `mean` of x, y and disparity, and the moments of each pair of these.
 #[derive(Clone, Copy, Default)]
 struct Moments {
     weight: i64,
@@ -21,10 +21,10 @@ struct Moments {
     pairs: [[i64; 3]; 3],
 }
 
-/// A plane through them: its value, its slopes, and whether it is trusted.
+/// A plane through the moments: its value, its slopes, and whether it is trusted.
 type Fit = Option<(i64, [i64; 2], bool)>;
 
-/// Filled pixels take planes through what is measured, and so do measured ones of little confidence far from them.
+/// Filled pixels and unsure measured ones far from their plane take planes through measured pixels.
 pub fn far_plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let refinement = &plan.method.refinement;
     let half = plan.method.schedule.match_size == MatchSize::Half;
@@ -92,7 +92,7 @@ fn share(a: [i64; 3], b: [i64; 3], own: &Moments, other: &Moments) -> i64 {
     i64::from(shares[(apart as usize).min(shares.len() - 1)])
 }
 
-/// Pixel places from the middle of a patch, in half pixels.
+/// Pixel positions relative to the middle of a patch, in half pixels.
 fn middle(at: usize) -> i64 {
     [-3, -1, 1, 3][at % 4]
 }
@@ -141,7 +141,7 @@ fn own(maps: &Finest, patch: Patch, fit: &Fit) -> Moments {
     Moments { weight: (s + 4) / 8, mean, pairs }
 }
 
-/// What patch `i` of a line sums up, where `shares` are left after each step of the line.
+/// The sum of a line of patches at patch `i`, with the `shares` that pass each step.
 fn sum(line: Vec<Moments>, axis: usize, shares: &[i64], i: usize) -> Moments {
     let ahead = (0..i).fold(line[0], |sum, i| and(line[i + 1], carried(sum, axis, -4096, shares[i])));
     let behind = (i + 1..line.len()).rev();

@@ -4,7 +4,7 @@ use super::plane::through;
 use mrfgs::image::Pair;
 use mrfgs::low_level::plan::Plan;
 
-/// Planes through what is around filled pixels, or medians of it: first far in all directions, then along rows.
+/// Planes, or medians, over the surroundings of filled pixels: first far in all directions, then along rows.
 pub fn fill_plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let sigma_range = plan.method.refinement.median_sigma_range / 3.0;
     for step in [(8, 8), (16, 1)] {

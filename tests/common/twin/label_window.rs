@@ -4,8 +4,8 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::options::Order;
 use std::ops::Range;
 
-/// The label windows of `level`, (first, count) of each run in each row of windows, from the beliefs of the next coarser
-/// level or the label ranges, whichever decides.
+/// The label windows of `level`, (first, count) of each run in each row of windows, from the beliefs of the
+/// next coarser level or from the label ranges.
 pub fn label_window(
     plan: &Plan,
     level: usize,

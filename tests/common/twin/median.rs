@@ -11,9 +11,9 @@ pub fn space(dx: i64, dy: i64, sigma_space: f64) -> i64 {
     (96.0 * (1.0 - (-e).exp())).round() as i64
 }
 
-/// The weight that the difference of two colours subtracts from it.
+/// The weight that the difference of two colours subtracts.
 pub fn colour(a: [u16; 4], b: [u16; 4], sigma_range: f64) -> i64 {
-    // Its slope, as a number up to 1 and a number of doublings.
+    // The slope, as a number up to 1 and a number of doublings.
     let slope = 0.1 / sigma_range;
     let doublings = (0..7).find(|&k| slope / f64::from(1 << k) <= 1.0).unwrap_or(7);
     let scale = (256.0 * slope / f64::from(1 << doublings)).round().clamp(1.0, 256.0) as i64;
@@ -35,7 +35,7 @@ pub fn changes(plan: &Plan, validity: i32) -> bool {
     }
 }
 
-/// Whether a pixel was filled.
+/// Whether a pixel is filled.
 pub fn filled(validity: i32) -> bool {
     validity & i32::from(flag::FILLED) != 0
 }
@@ -44,11 +44,11 @@ fn known(validity: i32) -> bool {
     !invalid(validity) || filled(validity)
 }
 
-/// A window of places that are so many columns and rows apart.
+/// A window of places that are `step` columns and rows apart.
 pub struct Window {
     pub radius: i64,
     pub step: (i64, i64),
-    /// Whether it has only every second place, as on a checkerboard.
+    /// Whether only every second place counts, as on a checkerboard.
     pub checkered: bool,
     /// In places.
     pub sigma_space: f64,
@@ -56,7 +56,7 @@ pub struct Window {
 }
 
 impl Window {
-    /// That of the median.
+    /// The window of the median.
     pub fn of(plan: &Plan) -> Self {
         let refinement = &plan.method.refinement;
         Self {
@@ -71,7 +71,7 @@ impl Window {
 
 /// A place of a window that has a disparity.
 pub struct Place {
-    /// Where it is, in samples from the middle.
+    /// Its offset from the middle, in places.
     pub step: (i64, i64),
     pub disparity: i32,
     pub weight: i64,
@@ -106,7 +106,7 @@ pub fn places(
     places
 }
 
-/// The median of a window, to the nearest `step`.
+/// The median of a window, rounded to `step`.
 pub fn smooth(
     plan: &Plan,
     pair: &Pair,

@@ -1,6 +1,6 @@
 use super::Finest;
 
-/// The labels of the left view, mirrored, as those of the right one.
+/// Copies the labels of the left view, mirrored, to the right one.
 pub fn mirror_labels(maps: &mut Finest) {
     let (width, height) = maps.label.size();
     for y in 0..height {

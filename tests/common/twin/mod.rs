@@ -75,7 +75,7 @@ impl Finest {
     }
 }
 
-/// The 1 4 6 4 1 of the binomial filter, at -2 ..= 2.
+/// The binomial filter 1 4 6 4 1, at -2 ..= 2.
 pub fn binomial(place: i64) -> i64 {
     match place.abs() {
         0 => 6,
@@ -85,8 +85,7 @@ pub fn binomial(place: i64) -> i64 {
     }
 }
 
-/// The largest value of messages and beliefs, where their sums saturate; it also stands for "no label
-/// agrees".
+/// The largest value of messages and beliefs, at which their sums saturate; it also means "no label agrees".
 pub fn most(plan: &Plan) -> u32 {
     match plan.volume_width {
         VolumeWidth::Narrow => 255,
@@ -94,10 +93,10 @@ pub fn most(plan: &Plan) -> u32 {
     }
 }
 
-/// Stands for a value that is not defined: that of a label which a pixel does not have.
+/// An undefined value: that of a label that a pixel does not have.
 pub const UNDEFINED: u32 = u32::MAX;
 
-/// Truncates the sums `s` to a message; `counts` says which labels count for the smallest.
+/// Truncates the sums `s` to a message; the smallest is taken over the labels that `counts` accepts.
 pub fn cut(plan: &Plan, s: &[i64], counts: impl Fn(usize) -> bool, cut: Truncation) -> Vec<u32> {
     let (tau, infinite) = (i64::from(cut.tau), i64::from(most(plan)));
     let smallest = (0..s.len()).filter(|&d| counts(d)).map(|d| s[d]).min().unwrap_or(infinite);
@@ -110,8 +109,8 @@ pub fn cut(plan: &Plan, s: &[i64], counts: impl Fn(usize) -> bool, cut: Truncati
     (0..s.len()).map(message).collect()
 }
 
-/// The message of a variable to a factor: its belief minus the factor's old message, infinite where the belief is and,
-/// where truncation is absolute, minus its minimum over the labels that `count`.
+/// The message of a variable to a factor: its belief minus the factor's old message, infinite where the
+/// belief is and, if truncation is absolute, minus its minimum over the labels that `counts` accepts.
 pub fn variable_message(
     plan: &Plan,
     belief: &[u32],

@@ -3,18 +3,18 @@ use super::median::{Window, changes, places, smooth};
 use mrfgs::image::{Pair, Plane};
 use mrfgs::low_level::plan::Plan;
 
-/// A number of the definition, which must fit in 32 bits.
+/// Asserts that a number of the definition fits in 32 bits.
 fn fits(value: i64) -> i64 {
     i32::try_from(value).expect("a number that fits in 32 bits").into()
 }
 
-/// The median, and then the value of a plane through the disparities that it was taken of.
+/// The median, and then the value of a plane through the same disparities.
 pub fn plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let window = Window { checkered: true, ..Window::of(plan) };
     through(plan, pair, maps, &window, |validity| changes(plan, validity));
 }
 
-/// The same for `touched` pixels, in another window.
+/// [`plane`] for the `touched` pixels, in any window.
 pub fn through(
     plan: &Plan,
     pair: &Pair,

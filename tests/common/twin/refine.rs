@@ -2,14 +2,14 @@ use super::Finest;
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::low_level::plan::Plan;
 
-/// Which neighbours count, and how far the disparity may be from twice that of the label.
+/// Parameters of the fit: the neighbours that count, and the reach.
 #[derive(Clone, Copy)]
 pub struct Fit {
-    /// Columns and rows to either side.
+    /// Columns and rows to either side that count.
     pub window: (i64, i64),
-    /// Labels between a neighbour and the centre.
+    /// Largest label difference between a neighbour and the centre.
     pub near: i64,
-    /// In pixels of the full size.
+    /// Largest offset from twice the label's disparity, in full-size pixels.
     pub reach: i64,
 }
 
@@ -17,7 +17,7 @@ impl Fit {
     pub const DEFINED: Self = Self { window: (2, 1), near: 1, reach: 4 };
 }
 
-/// The bits of a pixel, in raster order; every second one where there is no pixel.
+/// The census of a pixel in raster order; alternating bits outside the image and on masked pixels.
 fn census(image: &Image, x: i64, y: i64) -> Vec<bool> {
     let (width, height) = (image.width() as i64, image.height() as i64);
     let inside = x >= 0 && x < width && y >= 0 && y < height;
@@ -40,12 +40,12 @@ fn census(image: &Image, x: i64, y: i64) -> Vec<bool> {
     bits
 }
 
-/// The disparity of each pixel of half the size, in 1/256 px; `pair` knows its full size.
+/// The disparity of each half-size pixel, in 1/256 px; `pair` has its full size.
 pub fn refine(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     refine_by(&Fit::DEFINED, plan, pair, maps);
 }
 
-/// The same by another fit.
+/// Like [`refine`], with other parameters.
 pub fn refine_by(fit: &Fit, plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let full = pair.full().unwrap();
     let (width, height) = maps.label.size();

@@ -38,7 +38,7 @@ pub fn resolution(
                     children.push(at..at + f.labels);
                 }
             }
-            // U of each child.
+            // The minima U of each child.
             let mut u = Vec::new();
             for child in &children {
                 let q = from(&fine_belief[child.clone()], &old_down[child.clone()]);

@@ -3,8 +3,8 @@ use mrfgs::image::Plane;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 
-/// Flags ties, pixels whose runner-up is as good as the optimum, and small regions of the others. Every pixel starts as
-/// its own region; regions that touch take the smaller number, until nothing changes.
+/// Flags ties, where the runner-up equals the optimum, and small regions of the other pixels. Every pixel
+/// starts as its own region; touching regions take the smaller number until nothing changes.
 pub fn speckle_filter(plan: &Plan, maps: &mut Finest) {
     let (width, height) = plan.size();
     for y in 0..height {

@@ -2,14 +2,14 @@ use super::Finest;
 use mrfgs::image::Plane;
 use mrfgs::low_level::plan::Plan;
 
-/// Which pixels count, and how far the disparity may be from the label.
+/// Parameters of the fit: the neighbours that count, and the limit.
 #[derive(Clone, Copy)]
 pub struct Fit {
-    /// Columns and rows to either side.
+    /// Columns and rows to either side that count.
     pub reach: (i64, i64),
-    /// Labels between a neighbour and the centre.
+    /// Largest label difference between a neighbour and the centre.
     pub near: i64,
-    /// In 1/256 px.
+    /// Largest offset from the label, in 1/256 px.
     pub most: f64,
 }
 
@@ -22,7 +22,7 @@ pub fn sub_pixel(plan: &Plan, cost: &[u32], maps: &mut Finest) {
     sub_pixel_by(&Fit::DEFINED, plan, cost, maps);
 }
 
-/// The same by another fit.
+/// Like [`sub_pixel`], with other parameters.
 pub fn sub_pixel_by(fit: &Fit, plan: &Plan, cost: &[u32], maps: &mut Finest) {
     let level = &plan.levels[0];
     let (width, height, labels) = (level.width as i64, level.height as i64, level.labels as i64);

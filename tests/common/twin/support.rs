@@ -3,7 +3,7 @@ use super::fill::invalid;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 
-/// The mean confidence of the pixels around each one that have nearly its disparity.
+/// The mean confidence of the neighbourhood of each pixel; neighbours with another disparity count 0.
 pub fn support(plan: &Plan, maps: &mut Finest) {
     let (width, height) = plan.size();
     let before = maps.clone();

@@ -1,6 +1,6 @@
 use super::Finest;
 
-/// The labels of the two views in each other's place, mirrored.
+/// Exchanges the labels of the two views, mirrored.
 pub fn swap_views(maps: &mut Finest) {
     let old = maps.clone();
     let (width, height) = old.label.size();

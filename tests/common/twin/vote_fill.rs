@@ -17,7 +17,7 @@ struct Votes<'a> {
     plan: &'a Plan,
     pair: &'a Pair,
     maps: &'a Finest,
-    /// By row and column: the label that the right view sees there.
+    /// The label that the right view sees, by row and column.
     shown: Vec<Vec<Option<usize>>>,
 }
 
@@ -26,7 +26,7 @@ fn sure(maps: &Finest, at: (usize, usize)) -> bool {
     !invalid(maps.validity[at]) && maps.confidence[at] >= VOTE_SURE as i32
 }
 
-/// Filled pixels take the vote of the half-size pixel that looks like them, and outvoted ones their own.
+/// Filled pixels take the vote of the most similar half-size pixel, and outvoted ones that of their own.
 pub fn vote_fill(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     if plan.method.refinement.fill != Fill::Votes {
         return;
@@ -57,7 +57,7 @@ pub fn vote_fill(plan: &Plan, pair: &Pair, maps: &mut Finest) {
             let mut best: Option<(i64, i64)> = None;
             for (j, row) in (y / 2..).take(3).enumerate() {
                 for (i, column) in (x / 2..).take(3).enumerate() {
-                    // One column and row further up and left.
+                    // Rows and columns start one above and one to the left.
                     let (Some(row), Some(column)) = (row.checked_sub(1), column.checked_sub(1)) else {
                         continue;
                     };
@@ -101,7 +101,7 @@ impl Votes<'_> {
         self.plan.levels[0].labels
     }
 
-    /// Whether label `k` at a pixel is nearer than `j`, by at least so many labels.
+    /// Whether label `k` of a pixel is nearer than `j`, by at least `by` labels.
     fn nearer(&self, k: usize, j: usize, by: usize) -> bool {
         match self.plan.method.refinement.nearer {
             Nearer::Larger => k >= j + by,
@@ -109,13 +109,13 @@ impl Votes<'_> {
         }
     }
 
-    /// Column of the right view that label `k` leads to.
+    /// Column of the right view that label `k` of column `x` leads to.
     fn column(&self, k: usize, x: usize) -> Option<usize> {
         let column = usize::try_from(x as i64 - i64::from(self.plan.range.min) - k as i64);
         column.ok().filter(|&column| column < self.pair.size().0)
     }
 
-    /// The nearest label that sure pixels of row `y` show in each column of the right view.
+    /// The nearest label that confident pixels of row `y` show in each column of the right view.
     fn shown(&self, y: usize) -> Vec<Option<usize>> {
         let mut shown: Vec<Option<usize>> = vec![None; self.pair.size().0];
         for x in (0..shown.len()).filter(|&x| sure(self.maps, (x, y))) {
@@ -128,7 +128,7 @@ impl Votes<'_> {
         shown
     }
 
-    /// Whether label `k` at (x, y) would hide what the right view sees.
+    /// Whether label `k` at (x, y) would hide a pixel that the right view sees.
     fn hides(&self, k: usize, x: usize, y: usize) -> bool {
         let seen = self.column(k, x).and_then(|column| self.shown[y][column]);
         seen.is_some_and(|label| self.nearer(k, label, HIDING_LABELS as usize))
@@ -158,7 +158,7 @@ impl Votes<'_> {
         (0..self.labels()).step_by(2).map(of).collect()
     }
 
-    /// Weight of the step between two half-size pixels, in 1/65536, where it is `step` between pixels of one colour.
+    /// Weight of the step between two half-size pixels, in 1/65536; `step` is the weight for equal colours.
     fn weight(&self, step: f64, a: Half, b: Half) -> u64 {
         let difference = difference(self.half(a), self.half(b)) as f64;
         (65536.0 * step * (-0.0345 * difference).exp()).round() as u64

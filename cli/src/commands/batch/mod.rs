@@ -290,7 +290,7 @@ impl<'a> Batch<'a> {
         let georeferences = pair.georeferences();
         let pair = Some(pair).filter(|_| wanted.also.show_left());
         let (maps, sign, left) = (&matched.maps, Sign::default(), pair.as_ref().map(Pair::left));
-        let (sigma, third) = (Some(Sigma::of(&self.method)), self.third);
+        let (sigma, third) = (Some(Sigma::for_method(&self.method)), self.third);
         let outcome = Outcome { maps, range, sign, left, rig, rectifying, third, sigma, georeferences };
         self.named(claim, wanted.write(claim.folder(), &listed.name, &outcome))?;
         files.output = Some(wanted.map(&listed.name));

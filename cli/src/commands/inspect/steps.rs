@@ -9,7 +9,7 @@ use mrfgs::image::{Pair, Plane, write};
 use mrfgs::low_level::backend::{Backend, Stage, Volume};
 use mrfgs::low_level::engine::Inspection;
 use mrfgs::low_level::front::Prepared;
-use mrfgs::low_level::front::matches::Match;
+use mrfgs::low_level::front::matches::SparseMatch;
 use mrfgs::low_level::front::zones::Zones;
 use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::{Plan, UNITS_PER_NAT};
@@ -91,7 +91,7 @@ impl Steps {
         write::picture(&self.path("corrected-right.png"), &pair.right().to_rgb8())
     }
 
-    fn zones(&self, pair: &Pair, zones: &Zones, matches: &[Match]) -> Result<()> {
+    fn zones(&self, pair: &Pair, zones: &Zones, matches: &[SparseMatch]) -> Result<()> {
         let (width, height) = pair.size();
         write::picture(&self.path("zones.png"), &zones.map.map(|&zone| colour::zone(zone)))?;
         // Both views side by side, a line from each corner to its match.

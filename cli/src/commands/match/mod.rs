@@ -181,7 +181,7 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     drop(input);
     let pair = Some(pair).filter(|_| args.also.show_left());
     let left = pair.as_ref().map(Pair::left);
-    let (maps, sign, sigma) = (&matched.maps, args.sign, Some(Sigma::of(&method)));
+    let (maps, sign, sigma) = (&matched.maps, args.sign, Some(Sigma::for_method(&method)));
     let outcome = Outcome { maps, range, sign, left, rig, rectifying, third, sigma, georeferences };
     let mut record = MatchRecord::new(&files, &matched, time, args.sign);
     record.rectified = args.rectify;

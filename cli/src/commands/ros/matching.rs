@@ -57,7 +57,7 @@ impl<'a> Matching<'a> {
     pub(super) fn new(args: &'a Args, cameras: Cameras, execution: Execution) -> Result<Self> {
         let third = args.also.third()?;
         let method = args.also.made_by(args.method.method()?)?;
-        let sigma = Sigma::of(&method);
+        let sigma = Sigma::for_method(&method);
         if args.are_rectified(&cameras) {
             args.rectification.options_if(false)?;
         }

@@ -239,7 +239,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         let plan = Plan::new(width, height, input.range, &method)?;
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
-    let sigma = Sigma::of(&method);
+    let sigma = Sigma::for_method(&method);
     let mut matcher = Matcher::builder().method(method).execution(execution).build()?;
     let range = range_of_all(&mut matcher, &input, args)?;
     let rectifying = input.rectifying();
