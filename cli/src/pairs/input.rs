@@ -291,6 +291,11 @@ impl Input {
         self.rectification.as_ref().map(|by| by.rotations()[0])
     }
 
+    /// Whether sparse matches have found the range.
+    pub(crate) fn has_found_range(&self) -> bool {
+        self.by_matches
+    }
+
     /// Says which range was found, if the user gave none; `place` is where, if not in the pair.
     pub(crate) fn say_range(&self, sign: Sign, place: &str) {
         if self.by_matches {
