@@ -43,7 +43,7 @@ use flate2::read::GzDecoder;
 use cameras::StereoCalibration;
 use node::{Entries, Node};
 
-use crate::error::{Error, Result, in_words};
+use crate::error::{Error, Result};
 use crate::image::calib::Unit;
 use crate::text;
 
@@ -257,7 +257,7 @@ fn unpacked(path: &Path, bytes: Vec<u8>) -> Result<Vec<u8>> {
     match read {
         Ok(count) if count as u64 <= MAX_BYTES => Ok(unpacked),
         Ok(_) => Err(Error::read(path, "unpacked, is larger than any calibration file; is it one?")),
-        Err(error) => Err(Error::read(path, format!("is damaged gzip: {}; copy it again", in_words(&error)))),
+        Err(_) => Err(Error::read(path, "is damaged gzip, or a part of it is missing; copy it again")),
     }
 }
 

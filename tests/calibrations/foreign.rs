@@ -118,7 +118,7 @@ fn binaries() -> Vec<File> {
         file(
             "cut.gz",
             &gzip(opencv(NAMES).as_bytes())[..60],
-            "is damaged gzip: it ends too early; copy it again",
+            "is damaged gzip, or a part of it is missing; copy it again",
         ),
         file("empty.gz", gzip(b""), "is empty"),
         file("calibrationdata.tar.gz", gzip(&at(257, b"ustar")), "tar archive & unpack it"),
