@@ -170,9 +170,8 @@ impl AlsoArgs {
         }
     }
 
-    /// Why the wanted depths or points of what is in front of the cameras come out empty, and what helps.
+    /// Why depths or the wanted points of what is in front of the cameras come out empty, and what helps.
     pub(crate) fn left_out(&self, outcome: &Outcome) -> Option<String> {
-        self.take_cameras()?;
         let points = self.wanted().any(|also| matches!(also.kind, Kind::Points(_)));
         empty::left_out(self.limits, outcome, points)
     }

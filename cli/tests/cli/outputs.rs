@@ -239,18 +239,15 @@ fn depths_that_come_out_empty() {
             "warning: --clip-depth leaves nothing, since the nearest depth is & raise it".into(),
         ),
     ] {
-        let said =
-            run(&folder, &format!("match @slanted/im0.png @slanted/im1.png d.pfm --device cpu {more}"));
-        said.succeeded().says(&words);
+        let line = format!("match @slanted/im0.png @slanted/im1.png d.pfm --device cpu {more}");
+        let said = run(&folder, &line).succeeded();
+        said.says(&words);
         assert_eq!(
             said.stderr.matches("warning: --").count() + said.stderr.matches(front).count(),
             1,
             "{more}"
         );
-        let quiet = run(
-            &folder,
-            &format!("match @slanted/im0.png @slanted/im1.png d.pfm --device cpu --quiet {more}"),
-        );
+        let quiet = run(&folder, &format!("{line} --quiet"));
         assert_eq!(quiet.succeeded().stderr, "", "{more}");
     }
     run(&folder, "match @slanted/im0.png @slanted/im1.png d.pfm --device cpu --max-disparity 31").succeeded();
