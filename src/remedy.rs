@@ -180,7 +180,9 @@ impl Vocabulary {
             RangeError::TooManyLabels { .. } => (max, ": narrow the range".into()),
             RangeError::OutsideImages { .. } => (max, ": give a range that fits the pair".into()),
             RangeError::NotFound { cause: Some(_) } => return cause.to_string(),
-            RangeError::NotFound { cause: None } => return format!("{cause}: give {}", self.given_range()),
+            RangeError::NotFound { cause: None } => {
+                return format!("{cause}: check that both show one scene, or give {}", self.given_range());
+            }
             RangeError::NotRectified => {
                 let by = and(" by ", self.rectify);
                 return format!("{cause}: rectify the pair{by}, or give {}", self.given_range());

@@ -2,10 +2,21 @@
  *
  *     match-c LEFT.pnm RIGHT.pnm MAX-DISPARITY MAP.pfm CONFIDENCE.pgm VALIDITY.pgm RIGHT-MAP.pfm SIGMA.pfm REGION.pfm STEADY.pfm
  *
- * Then it makes every mistake that a caller can make. */
+ * Then it makes every mistake that a caller can make, and matches again in a process that it forks. */
+#if defined(__unix__) || defined(__APPLE__)
+#define CAN_FORK 1
+/* What C11 alone hides: fork and waitpid. */
+#define _POSIX_C_SOURCE 200809L
+#endif
+
 #include "pnm.h"
 
 #include <mrfgs.h>
+
+#ifdef CAN_FORK
+#include <sys/wait.h>
+#include <unistd.h>
+#endif
 
 /* The first header had no map of the right view, the second no errors. */
 #define FIRST_SIZE offsetof(mrfgs_maps, right)
@@ -314,6 +325,50 @@ static void steady(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ran
     free((void *)left.data), free((void *)right.data), free(disparity), free(confidence), free(validity);
 }
 
+#ifdef CAN_FORK
+/* A child of a process that has matched finds the same map, with the matcher of its parent and with one of its own, and ends. */
+static void forked(const mrfgs_options *options, mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range,
+                   const struct pnm *expected) {
+    mrfgs_image left = spread(&frames[0], 0), right = spread(&frames[1], 0);
+    size_t bytes = expected->width * expected->height * sizeof(float);
+    float *found = malloc(bytes);
+    mrfgs_maps maps = {.size = sizeof maps, .disparity = found, .disparity_stride = expected->width * sizeof(float)};
+    CHECK(mrfgs_match(matcher, &left, &right, &range, &maps) == MRFGS_STATUS_OK);
+    CHECK(memcmp(found, expected->data, bytes) == 0);
+    fflush(NULL);
+    pid_t child = fork();
+    CHECK(child >= 0);
+    if (child == 0) {
+        /* What hangs is killed. */
+        alarm(300);
+        mrfgs_matcher *own;
+        CHECK(mrfgs_matcher_new(options, &own) == MRFGS_STATUS_OK);
+        mrfgs_matcher *matchers[2] = {matcher, own};
+        for (int i = 0; i < 2; i++) {
+            memset(found, 0, bytes);
+            CHECK(mrfgs_match(matchers[i], &left, &right, &range, &maps) == MRFGS_STATUS_OK);
+            CHECK(memcmp(found, expected->data, bytes) == 0);
+        }
+        mrfgs_matcher_free(own);
+    }
+    if (child != 0) {
+        int status;
+        CHECK(waitpid(child, &status, 0) == child);
+        CHECK(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+        memset(found, 0, bytes);
+        CHECK(mrfgs_match(matcher, &left, &right, &range, &maps) == MRFGS_STATUS_OK);
+        CHECK(memcmp(found, expected->data, bytes) == 0);
+    }
+    free((void *)left.data);
+    free((void *)right.data);
+    free(found);
+    if (child == 0) {
+        mrfgs_matcher_free(matcher);
+        exit(0);
+    }
+}
+#endif
+
 int main(int argc, char **argv) {
     if (argc != 11) return 2;
     CHECK(strlen(mrfgs_last_error()) == 0);
@@ -340,6 +395,9 @@ int main(int argc, char **argv) {
     if (frames[0].channels == 3) formats(matcher, frames, range, &maps[0]);
     warnings(matcher, frames, range);
     mistakes(options, matcher, frames);
+#ifdef CAN_FORK
+    forked(options, matcher, frames, range, &maps[0]);
+#endif
     mrfgs_options_free(options);
     mrfgs_matcher_free(matcher);
     for (int i = 0; i < 2; i++) free(frames[i].data);

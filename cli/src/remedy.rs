@@ -103,7 +103,10 @@ mod tests {
                 RangeError::OutsideImages { min: 60, max: 70, width: 60 }.into(),
                 "--max-disparity ... give a range",
             ),
-            (RangeError::NotFound { cause: None }.into(), "too few matches ... give --max-disparity"),
+            (
+                RangeError::NotFound { cause: None }.into(),
+                "too few matches ... one scene, or give --max-disparity",
+            ),
             (
                 RangeError::NotRectified.into(),
                 "not rectified ... rectify the pair by --rectify ... or give --max-disparity",

@@ -257,7 +257,7 @@ fn unpacked(path: &Path, bytes: Vec<u8>) -> Result<Vec<u8>> {
     match read {
         Ok(count) if count as u64 <= MAX_BYTES => Ok(unpacked),
         Ok(_) => Err(Error::read(path, "unpacked, is larger than any calibration file; is it one?")),
-        Err(error) => Err(Error::read(path, format!("is damaged gzip: {error}; copy it again"))),
+        Err(_) => Err(Error::read(path, "is damaged gzip, or a part of it is missing; copy it again")),
     }
 }
 

@@ -94,11 +94,23 @@ impl Reader {
     /// # Errors
     /// The errors of [`Reader::pair`], and when the file holds only one view.
     pub fn both(self, file: &Path, mask: Option<&Path>) -> Result<(Pair, bool)> {
+        self.both_of(file, mask, Sizes::Equal)
+    }
+
+    /// Like [`Reader::both`], of raw images, which may differ in size: see [`Pair::of_raw_frames`].
+    ///
+    /// # Errors
+    /// Those of [`Reader::both`], but for the sizes.
+    pub fn raw_both(self, file: &Path, mask: Option<&Path>) -> Result<(Pair, bool)> {
+        self.both_of(file, mask, Sizes::Any)
+    }
+
+    fn both_of(self, file: &Path, mask: Option<&Path>, sizes: Sizes) -> Result<(Pair, bool)> {
         let bytes = load(file, self.max_pixels)?;
         let views = both::decode_both(file, &bytes, self.max_pixels, self.no_data, self.orient);
         let ([left, right], is_ordered) = views.map_err(|cause| Error::read(file, cause))?;
         let names = ["left", "right"].map(|side| format!("the {side} view in {}", file.display()));
-        let pair = raster::joined([self.masked(left, mask, file)?, right], names, Sizes::Equal)?;
+        let pair = raster::joined([self.masked(left, mask, file)?, right], names, sizes)?;
         Ok((pair, is_ordered))
     }
 

@@ -115,7 +115,11 @@ fn binaries() -> Vec<File> {
     all.extend([
         file("readme.gz", gzip(readme), NONE),
         file("image.gz", gzip(&at(0, b"\x89PNG\r\n\x1a\n")), "a PNG image"),
-        file("cut.gz", &gzip(opencv(NAMES).as_bytes())[..60], "damaged gzip & copy it again"),
+        file(
+            "cut.gz",
+            &gzip(opencv(NAMES).as_bytes())[..60],
+            "is damaged gzip, or a part of it is missing; copy it again",
+        ),
         file("empty.gz", gzip(b""), "is empty"),
         file("calibrationdata.tar.gz", gzip(&at(257, b"ustar")), "tar archive & unpack it"),
         file("readme-of-windows.txt", utf16("A project\r\nof some kind\r\n"), NONE),

@@ -12,7 +12,7 @@ use mrfgs::options::DisparityRange;
 use crate::args::{CameraArgs, CropArgs, ReadingArgs, Sign, disparity, scale};
 use crate::console;
 use crate::failure::{Failure, Result};
-use crate::outputs::{AlsoArgs, Outcome, Written, files};
+use crate::outputs::{AlsoArgs, InFront, Outcome, Written, files, other_sign};
 use crate::pairs::input;
 
 const EXAMPLES: &str = "\
@@ -137,6 +137,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if let Some(behind) = behind.filter(|_| !args.quiet) {
         console::say(&format!("warning: {}: {behind}", args.map.display()));
     }
+    if let Some(why) = args.also.left_out(&outcome).filter(|_| !args.quiet) {
+        console::say(&format!("warning: {}: {why}", args.map.display()));
+    }
     if !args.quiet && !said.is_empty() {
         said.dedup();
         let unit = input::unit(calibration.unit, path.as_deref());
@@ -150,31 +153,19 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 /// # Errors
 /// Where all of it is, or it holds no disparity.
 fn behind(args: &Args, map: &Plane<f32>, rig: &Rig) -> Result<Option<String>> {
-    let known = || map.data().iter().copied().filter(|d| d.is_finite());
-    let in_front = |sign: f64| known().filter(|d| rig.depth(sign * f64::from(*d)).is_some()).count();
-    let (all, seen, negated) = (known().count(), in_front(1.0), in_front(-1.0));
-    if all == 0 {
+    let in_front = InFront::of(map, rig);
+    if in_front.all == 0 {
         return Err(Error::read(
             &args.map,
             "holds no disparity: all of its pixels are infinite or no numbers",
         )
         .into());
     }
-    if 2 * seen >= all {
-        return Ok(None);
+    let check = "check that the calibration is of this map, and that the map is not empty";
+    match in_front.doubt(&other_sign(args.sign), check) {
+        Some(told) if in_front.seen == 0 => Err(Error::read(&args.map, told).into()),
+        told => Ok(told),
     }
-    let remedy = if negated > seen {
-        let sign = match args.sign {
-            Sign::LeftMinusRight => "right-minus-left",
-            Sign::RightMinusLeft => "left-minus-right",
-        };
-        format!("they may count the other way: give --sign {sign}")
-    } else {
-        "check that the calibration is of this map, and that the map is not empty".into()
-    };
-    let told =
-        format!("{} of {all} disparities are of nothing in front of the cameras; {remedy}", all - seen);
-    if seen == 0 { Err(Error::read(&args.map, told).into()) } else { Ok(Some(told)) }
 }
 
 /// The calibration of a map of this size, and its file, where it has one.

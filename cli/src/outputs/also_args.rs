@@ -15,6 +15,7 @@ use serde::{Serialize, Serializer};
 
 use crate::failure::{Failure, Result};
 use crate::outputs::also::{ALL, Also, Kind};
+use crate::outputs::empty;
 use crate::outputs::limits::Limits;
 use crate::outputs::messages::{self, Content};
 use crate::outputs::outcome::{Of, Outcome, View};
@@ -167,6 +168,12 @@ impl AlsoArgs {
             )),
             None => Ok(wanted),
         }
+    }
+
+    /// Why depths or the wanted points of what is in front of the cameras come out empty, and what helps.
+    pub(crate) fn left_out(&self, outcome: &Outcome) -> Option<String> {
+        let points = self.wanted().any(|also| matches!(also.kind, Kind::Points(_)));
+        empty::left_out(self.limits, outcome, points)
     }
 
     /// Refuses a limit of depths without depths.

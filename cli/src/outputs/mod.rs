@@ -3,6 +3,7 @@
 pub(crate) mod also;
 mod also_args;
 mod claim;
+mod empty;
 pub(crate) mod files;
 mod film;
 mod limits;
@@ -17,6 +18,7 @@ mod viewer;
 pub(crate) use also::Also;
 pub(crate) use also_args::AlsoArgs;
 pub(crate) use claim::Claim;
+pub(crate) use empty::{InFront, other_sign};
 pub(crate) use files::{Written, is_printed};
 pub(crate) use film::Film;
 pub(crate) use map_args::{Format, MapArgs};

@@ -291,6 +291,11 @@ impl Input {
         self.rectification.as_ref().map(|by| by.rotations()[0])
     }
 
+    /// Whether sparse matches have found the range.
+    pub(crate) fn has_found_range(&self) -> bool {
+        self.by_matches
+    }
+
     /// Says which range was found, if the user gave none; `place` is where, if not in the pair.
     pub(crate) fn say_range(&self, sign: Sign, place: &str) {
         if self.by_matches {
@@ -360,15 +365,14 @@ pub(crate) fn views(
 ) -> mrfgs::Result<Pair> {
     match right {
         Some(right) => reader.pair(left, right, mask),
-        None => both(reader, left, mask),
+        None => Ok(ordered(reader.both(left, mask)?, mask)),
     }
 }
 
 /// The pair in one file. Where that does not say which view is the left one, its matches do, unless a mask of the left view is given.
-fn both(reader: Reader, file: &Path, mask: Option<&Path>) -> mrfgs::Result<Pair> {
-    let (pair, is_ordered) = reader.both(file, mask)?;
+fn ordered((pair, is_ordered): (Pair, bool), mask: Option<&Path>) -> Pair {
     let is_swapped = || check::warnings(&pair, None).iter().any(|w| matches!(w, Warning::Swapped { .. }));
-    Ok(if !is_ordered && mask.is_none() && is_swapped() { pair.exchanged() } else { pair })
+    if !is_ordered && mask.is_none() && is_swapped() { pair.exchanged() } else { pair }
 }
 
 /// Puts what follows the views in its place on a command line. A file `left` that holds both views has no `right` one, so that what follows
@@ -387,7 +391,7 @@ pub(crate) fn behind_views(
     Ok(())
 }
 
-/// The raw pair in two files, which may differ in size, or in one file that holds both views.
+/// The raw pair in two files, or in one that holds both views. These may differ in size.
 pub(crate) fn raw_views(
     reader: Reader,
     left: &Path,
@@ -396,7 +400,7 @@ pub(crate) fn raw_views(
 ) -> mrfgs::Result<Pair> {
     match right {
         Some(right) => reader.raw_pair(left, right, mask),
-        None => both(reader, left, mask),
+        None => Ok(ordered(reader.raw_both(left, mask)?, mask)),
     }
 }
 

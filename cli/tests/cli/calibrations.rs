@@ -369,6 +369,51 @@ fn images_of_another_size_are_told() {
     assert!(differing(&folder, "two/im0.png", "fits/im0.png") == 0.0);
     assert!(differing(&folder, "two/mask1.png", "fits/mask1.png") < 0.05, "the right view shows as much");
     run(&folder, "rectify @raw/left.png right.png alone").failed(1, "right.png is 480 x 360 & one size");
+    // So are both views in one file.
+    let jpegs = [scene("raw/left.png"), folder.join("right.png")].map(|view| {
+        let mut file = std::io::Cursor::new(Vec::new());
+        image::open(view).unwrap().to_rgb8().write_to(&mut file, image::ImageFormat::Jpeg).unwrap();
+        file.into_inner()
+    });
+    for (name, jpeg) in ["l.jpg", "r.jpg"].iter().zip(&jpegs) {
+        fs::write(folder.join(name), jpeg).unwrap();
+    }
+    fs::write(folder.join("both.mpo"), mpo(jpegs)).unwrap();
+    let line = "d.pfm --rectify --calib fits.yml --max-disparity 31 --method fast --device cpu --quiet";
+    for (views, out) in [("l.jpg r.jpg", "files"), ("both.mpo", "one")] {
+        run(&folder, &format!("rectify {views} {out} --calib fits.yml")).succeeded();
+        run(&folder, &format!("match {views} {out}-{line}")).succeeded();
+    }
+    alike(&folder.join("files"), &folder.join("one"), "both views in one file");
+    let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
+    assert!(bytes("files-d.pfm") == bytes("one-d.pfm"));
+    run(&folder, "rectify both.mpo alone").failed(1, "the right view in both.mpo is 480 x 360 & one size");
+    run(&folder, "match both.mpo d.pfm --max-disparity 31").failed(1, "both.mpo is 480 x 360 & one size");
+}
+
+/// An MPO file of two JPEG files.
+fn mpo([left, right]: [Vec<u8>; 2]) -> Vec<u8> {
+    // Behind its marker, its length and its name a segment of the first image lists both: 58 bytes, counted from their fifth one.
+    const SEGMENT: usize = 66;
+    let entry = |kind: u32, size: usize, offset: usize| {
+        [kind, size as u32, offset as u32, 0].map(u32::to_le_bytes).concat()
+    };
+    let first = left.len() + SEGMENT;
+    let list = [
+        b"II*\0".to_vec(),
+        8_u32.to_le_bytes().to_vec(),
+        1_u16.to_le_bytes().to_vec(),
+        // The entry of the list: 32 bytes of no type, from byte 26 on; and no further directory.
+        [0x02, 0xb0, 7, 0, 32, 0, 0, 0, 26, 0, 0, 0].to_vec(),
+        vec![0; 4],
+        entry(0x0003_0000, first, 0),
+        entry(0x0002_0000, right.len(), first - 10),
+    ]
+    .concat();
+    let length = (2 + 4 + list.len() as u16).to_be_bytes();
+    let segment = [&[0xff, 0xe2], &length[..], b"MPF\0", &list].concat();
+    assert_eq!(segment.len(), SEGMENT);
+    [&left[..2], &segment, &left[2..], &right].concat()
 }
 
 #[test]

@@ -4,7 +4,9 @@
 use mrfgs::Matcher;
 use mrfgs::options::Method;
 use mrfgs_node::topics::{Participant, Publication, Subscriptions};
-use mrfgs_ros::messages::{CameraInfo, DisparityImage, Encode, Encoding, Header, Image, Stamp, Type};
+use mrfgs_ros::messages::{
+    CameraInfo, CompressedImage, DisparityImage, Encode, Encoding, Header, Image, Stamp, Type,
+};
 
 use super::*;
 
@@ -196,6 +198,42 @@ fn a_node_matches_what_cameras_publish() {
     {
         assert!(said.contains(words), "no `{words}` in {said}");
     }
+}
+
+#[test]
+fn topics_of_another_type_are_named() {
+    let node = Node::new(
+        "--remap left/image_raw:=/strange/left/image_rect -r right/image_raw:=/strange/right/image_rect",
+    );
+    let participant = Participant::new(domain()).unwrap();
+    let publish = |name: &str, kind| participant.publish(&format!("/strange/{name}"), kind).unwrap();
+    let mut strangers = [
+        publish("left/image_rect", CompressedImage::NAME),
+        publish("right/camera_info", "std_msgs/msg/String"),
+        // Control: this one is as it should be.
+        publish("right/image_rect", Image::NAME),
+    ];
+    let start = Instant::now();
+    while !strangers.iter_mut().all(Publication::has_listeners) {
+        assert!(start.elapsed() < Duration::from_secs(60), "the node was not found");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    for stranger in &strangers[..2] {
+        stranger.send(vec![0, 1, 0, 0, 9, 0, 0, 0, 7, 7, 7, 7]).unwrap();
+    }
+    std::thread::sleep(Duration::from_secs(2));
+    let said = node.stop();
+    for words in [
+        "/strange/left/image_rect is published with sensor_msgs/msg/CompressedImage, and sensor_msgs/msg/Image is expected: remap to a topic \
+         of that type, or one whose name ends with /compressed",
+        "/strange/right/camera_info is published with std_msgs/msg/String, and sensor_msgs/msg/CameraInfo is expected: remap to a topic of \
+         that type",
+    ] {
+        assert_eq!(said.lines().filter(|line| line.contains(words)).count(), 1, "{words}: {said}");
+    }
+    // What came is not called damaged, and the topic of the right type not strange.
+    assert!(!said.contains("a message of") && !said.contains("make no sense"), "{said}");
+    assert_eq!(said.matches("is published with").count(), 2, "{said}");
 }
 
 #[test]

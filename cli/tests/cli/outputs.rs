@@ -211,6 +211,54 @@ fn depth_of_what_is_behind_the_cameras() {
     assert!(bytes("negative.depth.pfm") == bytes("sound.depth.pfm"));
 }
 
+/// A match whose depths or points come out empty says why, and what helps.
+#[test]
+fn depths_that_come_out_empty() {
+    let folder = Folder::new();
+    let negative = "--min-disparity -31 --max-disparity -1";
+    let front = "disparities are of nothing in front of the cameras";
+    for (more, words) in [
+        (
+            format!("{negative} --also depth,points"),
+            format!("warning: & {front} & give --sign right-minus-left, or exchange the two images"),
+        ),
+        (
+            format!("{negative} --sign left-minus-right --also points"),
+            format!("{front} & give --sign right-minus-left"),
+        ),
+        (
+            "--min-disparity 0 --max-disparity 0 --also depth".into(),
+            format!("{front} & doffs, baseline & range"),
+        ),
+        (
+            "--also depth,points --min-confidence 255 --max-disparity 31".into(),
+            "warning: --min-confidence leaves nothing & lower it".into(),
+        ),
+        (
+            "--also points --clip-depth 0.01 --max-disparity 31".into(),
+            "warning: --clip-depth leaves nothing, since the nearest depth is & raise it".into(),
+        ),
+    ] {
+        let line = format!("match @slanted/im0.png @slanted/im1.png d.pfm --device cpu {more}");
+        let said = run(&folder, &line).succeeded();
+        said.says(&words);
+        assert_eq!(
+            said.stderr.matches("warning: --").count() + said.stderr.matches(front).count(),
+            1,
+            "{more}"
+        );
+        let quiet = run(&folder, &format!("{line} --quiet"));
+        assert_eq!(quiet.succeeded().stderr, "", "{more}");
+    }
+    run(&folder, "match @slanted/im0.png @slanted/im1.png d.pfm --device cpu --max-disparity 31").succeeded();
+    run(&folder, "depth d.pfm --calib @slanted/calib.txt --clip-depth 0.01")
+        .succeeded()
+        .says("warning: d.pfm: --clip-depth leaves nothing & raise it & depths of no pixel");
+    // Control: what is in front of the cameras is no matter of a warning.
+    let said = matched(&folder, "slanted", "d.pfm --max-disparity 31 --also depth,points");
+    assert!(!said.contains("warning"), "{said}");
+}
+
 /// Ranges by depth are those by disparity.
 #[test]
 fn ranges_may_be_depths() {

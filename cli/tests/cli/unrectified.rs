@@ -41,6 +41,12 @@ fn a_pair_is_rectified_by_its_matches() {
     run(&folder, &format!("match @raw/left.png @raw/right.png a.pfm {end}"))
         .failed(1, "too few matches & not rectified & --rectify & --max-disparity");
     assert!(!folder.join("a.pfm").exists());
+    // Nor where the views are of two scenes.
+    for (view, name) in [("slanted/im0.png", "l.png"), ("repetitive/im1.png", "r.png")] {
+        fs::copy(scene(view), folder.join(name)).unwrap();
+    }
+    run(&folder, &format!("match l.png r.png a.pfm {end}"))
+        .failed(1, "too few matches & check that both show one scene, or give --max-disparity");
     let said = run(
         &folder,
         &format!("match @raw/left.png @raw/right.png a.pfm --rectify {end} --json a.json --also preview"),

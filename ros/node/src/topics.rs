@@ -1,6 +1,8 @@
 //! Subscriptions and publications over DDS.
 
+use std::collections::HashMap;
 use std::convert::Infallible;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -13,8 +15,9 @@ use rustdds::no_key::{
 };
 use rustdds::policy::{Durability, History, Reliability, ResourceLimits};
 use rustdds::{
-    DataWriterStatus, DomainParticipant, DomainParticipantBuilder, GUID, Publisher, QosPolicies,
-    QosPolicyBuilder, RTPSEntity, RepresentationIdentifier, StatusEvented, Subscriber, Topic, TopicKind,
+    DataWriterStatus, DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusEvent, GUID,
+    Publisher, QosPolicies, QosPolicyBuilder, RTPSEntity, RepresentationIdentifier, StatusEvented,
+    Subscriber, Topic, TopicKind,
 };
 
 /// Largest domain that `ROS_DOMAIN_ID` may name.
@@ -42,6 +45,7 @@ pub type Result<T> = std::result::Result<T, Reason>;
 /// A member of a domain of DDS, which finds the others by itself.
 pub struct Participant {
     inner: DomainParticipant,
+    writers: Arc<Writers>,
     subscriber: Subscriber,
     publisher: Publisher,
 }
@@ -56,13 +60,12 @@ impl Participant {
         let qos = QosPolicyBuilder::new().build();
         let subscriber = inner.create_subscriber(&qos).map_err(failed)?;
         let publisher = inner.create_publisher(&qos).map_err(failed)?;
-        Ok(Self { inner, subscriber, publisher })
+        Ok(Self { inner, writers: Arc::default(), subscriber, publisher })
     }
 
     /// The topic `name`, a full one, of messages of the type `kind`, such as `sensor_msgs/msg/Image`.
     fn topic(&self, name: &str, kind: &str, qos: &QosPolicies) -> Result<Topic> {
-        // So ROS calls its topics in DDS: `rt/disparity`.
-        self.inner.create_topic(format!("rt{name}"), in_dds(kind), qos, TopicKind::NoKey).map_err(failed)
+        self.inner.create_topic(full(name), in_dds(kind), qos, TopicKind::NoKey).map_err(failed)
     }
 
     /// Publishes messages of the type `kind` on the topic `name`, which is a full one. They are sent again to those who ask for that.
@@ -96,7 +99,7 @@ impl Participant {
         let node = NodeEntitiesInfo {
             namespace: namespace.into(),
             name: name.into(),
-            readers: subscriptions.readers.iter().map(|(reader, _)| gid(reader.guid())).collect(),
+            readers: subscriptions.of.iter().map(|one| gid(one.reader.guid())).collect(),
             writers: publications.map(|publication| gid(publication.writer.guid())).collect(),
         };
         let told = ParticipantEntitiesInfo { gid: gid(self.inner.guid()), nodes: vec![node] };
@@ -115,10 +118,22 @@ impl Participant {
     }
 }
 
+/// What ROS calls a topic in DDS: `rt/disparity`.
+fn full(name: &str) -> String {
+    format!("rt{name}")
+}
+
 /// What ROS calls a type in DDS: `sensor_msgs::msg::dds_::Image_`.
 fn in_dds(kind: &str) -> String {
     let (package, own) = kind.rsplit_once('/').unwrap_or(("", kind));
     format!("{}::dds_::{own}_", package.replace('/', "::"))
+}
+
+/// The type that ROS calls `kind` in DDS, as `sensor_msgs/msg/Image`; one that is not of ROS stays as it is.
+fn in_ros(kind: &str) -> String {
+    let parts =
+        kind.split_once("::dds_::").and_then(|(package, own)| Some((package, own.strip_suffix('_')?)));
+    parts.map_or_else(|| kind.into(), |(package, own)| format!("{}/{own}", package.replace("::", "/")))
 }
 
 /// Of a topic that keeps so many messages, and so many of them at all until they are confirmed or taken.
@@ -223,10 +238,57 @@ pub struct Announcement {
     _publication: Publication,
 }
 
+/// Those that publish in a domain: the topic of each, and its type, as DDS calls them.
+#[derive(Default)]
+struct Writers(Mutex<HashMap<GUID, [String; 2]>>);
+
+impl Writers {
+    fn known(&self) -> MutexGuard<'_, HashMap<GUID, [String; 2]>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes in who has come and gone.
+    fn follow(&self, participant: &DomainParticipant) {
+        while let Some(event) = participant.status_listener().try_recv_status() {
+            match event {
+                DomainParticipantStatusEvent::WriterDetected { writer } => {
+                    self.known().insert(writer.guid, [writer.topic_name, writer.type_name]);
+                }
+                DomainParticipantStatusEvent::WriterLost { guid, .. } => {
+                    self.known().remove(&guid);
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// One topic that is subscribed to.
+struct Subscription {
+    reader: DataReader<Message, AsTheyAre>,
+    /// The topic and its type, as DDS calls them.
+    called: [String; 2],
+    /// Nothing comes without it.
+    participant: DomainParticipant,
+    writers: Arc<Writers>,
+}
+
+impl Subscription {
+    /// The types of other messages that are published on its topic.
+    fn others(&self) -> Vec<String> {
+        let [topic, kind] = &self.called;
+        let known = self.writers.known();
+        let others = known.values().filter(|[of, other]| of == topic && other != kind);
+        let mut others: Vec<_> = others.map(|[_, other]| in_ros(other)).collect();
+        others.sort();
+        others.dedup();
+        others
+    }
+}
+
 /// Subscriptions of one thread, which it waits for together.
 pub struct Subscriptions {
-    /// Each with its participant, without which nothing comes.
-    readers: Vec<(DataReader<Message, AsTheyAre>, DomainParticipant)>,
+    of: Vec<Subscription>,
     poll: Poll,
     events: Events,
 }
@@ -238,7 +300,7 @@ impl Subscriptions {
     /// Where the system has nothing to wait with.
     pub fn new() -> Result<Self> {
         let poll = Poll::new().map_err(failed)?;
-        Ok(Self { readers: Vec::new(), poll, events: Events::with_capacity(16) })
+        Ok(Self { of: Vec::new(), poll, events: Events::with_capacity(16) })
     }
 
     /// Adds the topic `name`, a full one, of messages of the type `kind`. Those are the sender's who sends once, and if `reliable` only
@@ -255,14 +317,16 @@ impl Subscriptions {
         let qos = qos(reliability, WAITING, WAITING);
         let topic = to.topic(name, kind, &qos)?;
         let mut reader = to.subscriber.create_datareader_no_key(&topic, Some(qos)).map_err(failed)?;
-        let token = Token(self.readers.len());
+        let token = Token(self.of.len());
         self.poll.registry().register(&mut reader, token, Interest::READABLE).map_err(failed)?;
-        self.readers.push((reader, to.inner.clone()));
+        let (called, participant, writers) =
+            ([full(name), in_dds(kind)], to.inner.clone(), Arc::clone(&to.writers));
+        self.of.push(Subscription { reader, called, participant, writers });
         Ok(())
     }
 
     /// Waits for messages, for at most so long, and hands on those that came: the number of the topic, in the order in which they were
-    /// added, and the bytes as [`mrfgs_ros::messages`] takes them.
+    /// added, and the bytes as [`mrfgs_ros::messages`] takes them. Messages of another type than that of the topic are left out.
     ///
     /// # Errors
     /// Where DDS fails for good.
@@ -272,11 +336,39 @@ impl Subscriptions {
             _ => {}
         }
         // All are asked, whatever the events say: one that was missed would wait for the next message.
-        for (number, (reader, _)) in self.readers.iter_mut().enumerate() {
+        for (number, Subscription { reader, called, participant, writers }) in self.of.iter_mut().enumerate()
+        {
             while let Some(sample) = reader.take_next_sample().map_err(failed)? {
-                take(number, sample.into_value().0);
+                writers.follow(participant);
+                let writer = sample.sample_info().writer_guid();
+                // This DDS hands on whatever comes on a topic of that name.
+                if writers.known().get(&writer).is_none_or(|[_, kind]| *kind == called[1]) {
+                    take(number, sample.into_value().0);
+                }
             }
         }
         Ok(())
+    }
+
+    /// The topics on which messages of other types are published than were subscribed to: the number of each, in the order in which they were
+    /// added, and the types that others publish.
+    pub fn mistyped(&self) -> Vec<(usize, Vec<String>)> {
+        self.of.iter().for_each(|one| one.writers.follow(&one.participant));
+        let others = self.of.iter().map(Subscription::others).enumerate();
+        others.filter(|(_, others)| !others.is_empty()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn types_have_two_names() {
+        for kind in ["sensor_msgs/msg/Image", "stereo_msgs/msg/DisparityImage"] {
+            assert_eq!(in_ros(&in_dds(kind)), kind);
+        }
+        assert_eq!(in_dds("sensor_msgs/msg/Image"), "sensor_msgs::msg::dds_::Image_");
+        assert_eq!(in_ros("HelloWorld"), "HelloWorld");
     }
 }

@@ -10,7 +10,7 @@ use mrfgs::sigma::Sigma;
 
 use crate::args::{CameraArgs, ExecutionArgs, MethodArgs, RectificationArgs, RegionArgs, Sign};
 use crate::failure::{Failure, Result};
-use crate::outputs::{Also, AlsoArgs, MatchRecord, Outcome, View, Written, files};
+use crate::outputs::{Also, AlsoArgs, InFront, MatchRecord, Outcome, View, Written, files, other_sign};
 use crate::pairs::input::{self, Input, PairArgs};
 use crate::{console, matching, plan, stop};
 
@@ -176,6 +176,7 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     let files = args.pair.files(&input, Some(args.output()));
     let unit = input.unit();
     let georeferences = pair.georeferences();
+    let is_found = input.has_found_range();
     let rectifying = input.rectifying();
     let trust = input.rectification.as_ref().and_then(|by| by.trust().copied());
     drop(input);
@@ -188,10 +189,30 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     record.region = args.region.roi.as_ref().map(|part| [part.x.start, part.y.start]);
     record.trust = trust;
     let said = write_outputs(args, &also, &outcome, &record)?;
+    if let Some(why) = empty(args, &outcome, is_found).filter(|_| !args.quiet) {
+        console::say(&format!("warning: {why}"));
+    }
     if let Some(unit) = unit.filter(|_| !args.quiet && !said.is_empty()) {
         console::say(&format!("{}; unit: {unit}", said.join("; ")));
     }
     Ok(())
+}
+
+/// Why depths and points come out empty, or nearly so, and what helps. The range may be one that `is_found` by matches.
+fn empty(args: &Args, outcome: &Outcome, is_found: bool) -> Option<String> {
+    let rig = outcome.rig.as_ref()?;
+    let in_front = InFront::of(&outcome.maps.final_map(), rig);
+    if in_front.all == 0 {
+        let why = "no pixel has a disparity, and so none has a depth: check that both images show one scene, and the range";
+        return Some(why.into());
+    }
+    let turned = if is_found {
+        "the views may be exchanged: exchange the two images".into()
+    } else {
+        format!("{}, or exchange the two images", other_sign(args.sign))
+    };
+    let check = "check that the calibration (doffs, baseline) is of this pair, and that the range is of what is in front of the cameras";
+    in_front.doubt(&turned, check).or_else(|| args.also.left_out(outcome))
 }
 
 /// Finds out before any computing whether all outputs can be written. Returns the files of `--also`.

@@ -57,6 +57,8 @@ struct State {
     count: Count,
     /// Why a message makes no sense, where that was not told.
     unreadable: Option<(usize, Reason)>,
+    /// The topics on which others publish messages of other types, and these types.
+    mistyped: Vec<(usize, Vec<String>)>,
 }
 
 /// What arrives, between the thread that receives it and the one that matches.
@@ -109,6 +111,12 @@ impl Cameras {
         self.images.iter().all(Topic::is_rectified)
     }
 
+    /// The name and the type of a topic, by its number among the subscriptions.
+    pub(super) fn topic(&self, number: usize) -> [&str; 2] {
+        let side = number % 2;
+        if number < 2 { [self.image(side), self.kind(side)] } else { [self.info(side), CameraInfo::NAME] }
+    }
+
     /// What errors call an image of this time.
     pub(super) fn named(&self, side: usize, stamp: Stamp) -> PathBuf {
         format!("{} at {stamp}", self.image(side)).into()
@@ -154,6 +162,7 @@ impl Arrivals {
                     state.unreadable.get_or_insert((topic, reason));
                 }
             })?;
+            self.state().mistyped = subscriptions.mistyped();
         }
         Ok(())
     }
@@ -205,6 +214,11 @@ impl Arrivals {
     /// How much came so far.
     pub(super) fn count(&self) -> Count {
         self.state().count
+    }
+
+    /// The topics on which others publish messages of other types than are taken, and these types.
+    pub(super) fn mistyped(&self) -> Vec<(usize, Vec<String>)> {
+        self.state().mistyped.clone()
     }
 
     /// Why a message of a topic made no sense, once.

@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use mrfgs_ros::messages::{CompressedImage, Image, Type};
+
 use crate::console;
 use crate::text::plural;
 
@@ -102,8 +104,12 @@ impl Log {
     /// Says how it goes, where it is time.
     pub(super) fn tell(&mut self, cameras: &Cameras, arrivals: &Arrivals) {
         if let Some((topic, reason)) = arrivals.unreadable() {
-            let name = if topic < 2 { cameras.image(topic) } else { cameras.info(topic - 2) };
+            let [name, _] = cameras.topic(topic);
             self.complain(&format!("a message of {name} {reason}"));
+        }
+        for (topic, others) in arrivals.mistyped() {
+            let [name, expected] = cameras.topic(topic);
+            self.complain(&mistyped(name, expected, &others.join(" and ")));
         }
         let passed = self.period.elapsed();
         if passed < PERIOD {
@@ -134,6 +140,18 @@ impl Log {
         said.extend(left_out(&Count::default(), &count, self.failed + self.frames.failed));
         console::say(&said.join("; "));
     }
+}
+
+/// What to say of a topic whose messages are of another type.
+fn mistyped(name: &str, expected: &str, found: &str) -> String {
+    let remedy = if [expected, found] == [Image::NAME, CompressedImage::NAME] {
+        ", or one whose name ends with /compressed"
+    } else {
+        ""
+    };
+    format!(
+        "{name} is published with {found}, and {expected} is expected: remap to a topic of that type{remedy}"
+    )
 }
 
 /// How it went in a period.
