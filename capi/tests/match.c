@@ -223,7 +223,7 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     refused(wrong, mrfgs_options_set(options, "fill", "sand"), "\"fill\"", "sand");
     refused(wrong, mrfgs_options_set(options, "fill", "sand"), "none", "row");
     refused(wrong, mrfgs_options_set(options, "levels", "17"), "\"levels\"", "1 to 16");
-    refused(wrong, mrfgs_options_threads(options, 1025), "threads are 1025", "1 to 1024");
+    refused(wrong, mrfgs_options_threads(options, 1025), "threads is 1025", "1 to 1024");
     refused(wrong, mrfgs_options_set(options, NULL, "none"), "key", "null");
     refused(wrong, mrfgs_options_set(options, "fill", NULL), "value", "null");
     refused(wrong, mrfgs_options_device(options, NULL), "name", "null");
@@ -256,11 +256,11 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     bad = image, bad.stride = 1;
     refused(wrong, mrfgs_match(matcher, &bad, &image, &range, &maps), "left", "stride of 1");
     bad = image, bad.stride = SIZE_MAX / 2;
-    refused(wrong, mrfgs_match(matcher, &bad, &image, &range, &maps), "left", "no memory");
+    refused(wrong, mrfgs_match(matcher, &bad, &image, &range, &maps), "left", "too large for memory");
     bad = image, bad.width -= 1;
     refused(wrong, mrfgs_match(matcher, &image, &bad, &range, &maps), "one size", "121");
     bad = image, bad.height = 0;
-    refused(wrong, mrfgs_match(matcher, &bad, &bad, &range, &maps), "holds no pixel", "0");
+    refused(wrong, mrfgs_match(matcher, &bad, &bad, &range, &maps), "has no pixels", "0");
     mrfgs_range empty = {5, 4}, far = {0, 1 << 30};
     refused(wrong, mrfgs_match(matcher, &image, &image, &empty, &maps), "range", "raise range.max");
     refused(wrong, mrfgs_match(matcher, &image, &image, &far, &maps), "range", "1073741824");

@@ -453,11 +453,11 @@ class Match(unittest.TestCase):
             (ValueError, "1 to 4 channels", lambda: mrfgs.match(np.dstack([left, left]), right, 15)),
             (ValueError, "has pixels", lambda: mrfgs.match(left[:0], right[:0], 15)),
             (ValueError, "float", lambda: mrfgs.match(left, right.astype(np.float32), 15)),
-            (ValueError, "left: is int64 and holds -1; whole numbers are 0 to 255 or 0 to 65535: give what they mean",
+            (ValueError, "left: is int64 and contains -1; integers must be 0 to 255 or 0 to 65535: convert them",
              lambda: mrfgs.match(left.astype(np.int64) - 1 - left.min(), right, 15)),
             (ValueError, "right: is uint32 and holds 65536; whole", lambda: mrfgs.match(left, np.full((60, 80), 65536, np.uint32), 15)),
             (ValueError, "has pixels", lambda: mrfgs.match(left[:0].astype(int), right[:0].astype(int), 15)),
-            (TypeError, "left: give an array of whole numbers, float16, float32 or float64, not bool; astype", lambda: mrfgs.match(left > 9, right, 15)),
+            (TypeError, "left: give an array of integers, float16, float32 or float64, not bool; convert it with astype", lambda: mrfgs.match(left > 9, right, 15)),
             (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not 63.5", lambda: mrfgs.match(left, right, 63.5)),
             (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not NaN", lambda: mrfgs.match(left, right, np.nan)),
             (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not 10000000000", lambda: mrfgs.match(left, right, 10**10)),
@@ -564,7 +564,7 @@ class Match(unittest.TestCase):
         path, most = TESTDATA / "mixed" / "im0.png", "1 to 1024"
         for error, words, call in (
             # A path in the place of an array.
-            (TypeError, "left: give a numpy array, not the path of a file; mrfgs.read_image", lambda: matcher.match("left.png", right, 15)),
+            (TypeError, "left: give a numpy array, not the path of a file; read images with mrfgs.read_image", lambda: matcher.match("left.png", right, 15)),
             (TypeError, "right: give a numpy array, not the path of a file", lambda: matcher.match(left, path, 15)),
             (TypeError, "mask: give a numpy array, not the path of a file", lambda: matcher.match(left, right, 15, mask=b"mask.png")),
             (TypeError, "pair 0: left: give a numpy array, not the path", lambda: list(matcher.match_all([(str(path), right)], 15))),
@@ -572,16 +572,16 @@ class Match(unittest.TestCase):
             (TypeError, "left: give a numpy array, not the path of a file", lambda: mrfgs.Rectification.of_pair(path, path)),
             (TypeError, "disparity: give a numpy array, not the path of a file", lambda: rig.depth("d.pfm")),
             (TypeError, "sigma: give a numpy array, not the path of a file", lambda: rig.depth_sigma(found.disparity, "d.pfm")),
-            (TypeError, "truth: give a numpy array, not the path of a file; mrfgs.read_image reads an image, and mrfgs.read_disparity",
+            (TypeError, "truth: give a numpy array, not the path of a file; read images with mrfgs.read_image and maps with mrfgs.read_disparity",
              lambda: mrfgs.evaluate(found.disparity, Path("truth.pfm"))),
             (TypeError, "left: give a numpy array, not the path of a file", lambda: mrfgs.Steady().follow(found, path)),
             (TypeError, "left: give a numpy array, not the path of a file", lambda: mrfgs.Drift(by).follow(path, path, 15)),
             (TypeError, "left: give a numpy array, not the path of a file", lambda: rig.points(found, path)),
             # Shapes of other libraries.
-            (ValueError, "left: has the shape (3, 60, 80), with the channels first: give (height, width, channels), such as "
+            (ValueError, "left: has the shape (3, 60, 80), with channels first: give (height, width, channels), for example "
              "numpy.moveaxis(left, 0, -1), which has 60 rows of 80 pixels", lambda: matcher.match(first, first, 15)),
-            (ValueError, "right: has the shape (1, 60, 80), with the channels", lambda: matcher.match(left, first[:1], 15)),
-            (ValueError, "left: has the shape (3, 180, 240), with the channels", lambda: by.apply(*(np.moveaxis(r, -1, 0) for r in raw))),
+            (ValueError, "right: has the shape (1, 60, 80), with channels", lambda: matcher.match(left, first[:1], 15)),
+            (ValueError, "left: has the shape (3, 180, 240), with channels", lambda: by.apply(*(np.moveaxis(r, -1, 0) for r in raw))),
             (ValueError, "left: give an array of shape (height, width) or (height, width, channels), not (1, 60, 80, 3)",
              lambda: matcher.match(left[None], right, 15)),
             (ValueError, "disparity: give an array of shape (height, width), not (1, 60, 80); numpy.squeeze(disparity) has it",
@@ -594,16 +594,16 @@ class Match(unittest.TestCase):
             (TypeError, 'device: give "auto", "cpu", "gpu", or the index', lambda: mrfgs.Matcher(device=-1)),
             (TypeError, 'device: give "auto", "cpu", "gpu", or the index of a device or a part of its name, not 0.5', lambda: mrfgs.Matcher(device=0.5)),
             (TypeError, "not True", lambda: mrfgs.match(left, right, 15, device=True)),
-            (ValueError, f"threads: give a whole number, {most}, or None, not -1", lambda: mrfgs.Matcher(device="cpu", threads=-1)),
-            (TypeError, f"threads: give a whole number, {most}, or None, not '2'", lambda: mrfgs.match(left, right, 15, device="cpu", threads="2")),
-            (TypeError, "threads: give a whole number", lambda: mrfgs.Matcher(device="cpu", threads=1.5)),
+            (ValueError, f"threads: give an integer from {most}, or None, not -1", lambda: mrfgs.Matcher(device="cpu", threads=-1)),
+            (TypeError, f"threads: give an integer from {most}, or None, not '2'", lambda: mrfgs.match(left, right, 15, device="cpu", threads="2")),
+            (TypeError, "threads: give an integer", lambda: mrfgs.Matcher(device="cpu", threads=1.5)),
             (ValueError, f"threads: {2**63 - 1} threads cannot be had; give {most}", lambda: mrfgs.Matcher(device="cpu", threads=10**30)),
-            (TypeError, "options: the keys are names of options, which mrfgs.options() describes, such as \"fill\", not 3",
+            (TypeError, "options: keys must be names of options, such as \"fill\" (see mrfgs.options()), not 3",
              lambda: matcher.match(left, right, 15, options={3: 4})),
-            (TypeError, 'options["cost"]: the keys are names of options', lambda: matcher.match(left, right, 15, options={"cost": {None: 4}})),
+            (TypeError, 'options["cost"]: keys must be names of options', lambda: matcher.match(left, right, 15, options={"cost": {None: 4}})),
             (TypeError, 'options: give a dict, such as {"fill": "none"}, not str', lambda: matcher.match(left, right, 15, options="fill=none")),
             (TypeError, "options: give a dict", lambda: matcher.match_all([], 15, options=[7])),
-            (ValueError, "method: there is no preset 'best', and no such file; give one of ", lambda: matcher.match(left, right, 15, method="best")),
+            (ValueError, "method: 'best' is neither a preset nor a file; give one of ", lambda: matcher.match(left, right, 15, method="best")),
             (TypeError, "method: give the name of a preset, or the path of a TOML file", lambda: matcher.match_all([], 15, method=7)),
             (FileNotFoundError, "none.toml: there is no such file", lambda: matcher.match(left, right, 15, method="none.toml")),
             (ValueError, "memory: give a whole number of MiB, GiB or TiB, from 1MiB to 16TiB, like 2GiB", lambda: matcher.match(left, right, 15, memory="2GB")),
@@ -940,7 +940,7 @@ class Rectification(Folder):
         sigma = rig.depth_sigma(found.disparity, found.sigma)
         self.assertTrue(np.array_equal(sigma, read_pfm(self.folder / "d.depth-sigma.pfm")))
         self.assertTrue(np.array_equal(rig.depth_sigma(found.disparity, 2 * found.sigma), 2 * sigma))
-        self.refused(ValueError, "sigma: is 240 x 179, and disparity 240 x 180", lambda: rig.depth_sigma(found.disparity, found.sigma[1:]))
+        self.refused(ValueError, "sigma: is 240 x 179, but disparity is 240 x 180", lambda: rig.depth_sigma(found.disparity, found.sigma[1:]))
         near = np.isfinite(depth) & (depth < 65)
         self.assertLessEqual(np.abs(millimetres[near] - depth[near] * 1000).max(), 0.51)
         self.assertTrue((millimetres[~np.isfinite(depth)] == 0).all() and np.isinf(depth).any())
@@ -988,10 +988,10 @@ class Rectification(Folder):
         self.refused(FileNotFoundError, "none.yml: there is no such file", lambda: mrfgs.ThirdCamera("none.yml"))
         self.refused(TypeError, "camera: give a ThirdCamera, or the path of its file", lambda: rectified.registered(disparity, 7))
         self.refused(ValueError, "the text: ", lambda: mrfgs.ThirdCamera.of_text("K: [1, 2]"))
-        self.refused(ValueError, "ThirdCamera.of_text takes", lambda: mrfgs.ThirdCamera(third.read_text()))
+        self.refused(ValueError, "ThirdCamera.of_text", lambda: mrfgs.ThirdCamera(third.read_text()))
         self.refused(ValueError, "disparity: is 240 x 179", lambda: rectified.registered(disparity[1:], camera))
         unknown = mrfgs.Rig.of(260, 0.1, size=(240, 180))
-        self.refused(ValueError, "does not say the unit", lambda: unknown.registered_millimetres(disparity, camera))
+        self.refused(ValueError, "lacks the unit", lambda: unknown.registered_millimetres(disparity, camera))
 
     def test_forms_of_calibrations(self):
         text = CAMERAS.read_text()
@@ -1118,7 +1118,7 @@ class Rectification(Folder):
                 self.assertTrue(np.array_equal(other.cameras, rig.cameras))
                 map_ = disparity if rig.size in (None, (240, 180)) else np.full(rig.size[::-1], 9.5)
                 self.assertTrue(np.array_equal(other.depth(map_), rig.depth(map_)))
-        self.refused(ValueError, f"{path} is of images of 240 x 180", lambda: pickle.loads(pickle.dumps(ours)).depth(disparity[1:]))
+        self.refused(ValueError, f"{path} is for images of 240 x 180", lambda: pickle.loads(pickle.dumps(ours)).depth(disparity[1:]))
 
     def test_workers_take_them(self):
         with multiprocessing.get_context("spawn").Pool(1) as pool:
@@ -1132,7 +1132,7 @@ class Rectification(Folder):
         metres = mrfgs.Rectification(CAMERAS).rig
         self.assertEqual(unknown.unit, "unknown")
         self.assertTrue(np.array_equal(unknown.depth(disparity), metres.depth(disparity)))
-        self.refused(ValueError, "does not say the unit of the baseline; give it by Calibration(..., unit=", lambda: unknown.millimetres(disparity))
+        self.refused(ValueError, "lacks the unit of the baseline; use Calibration(..., unit=", lambda: unknown.millimetres(disparity))
         for unit, factor in (("m", 1), ("cm", 0.01), ("mm", 0.001)):
             rig = mrfgs.Rectification(mrfgs.Calibration.of_texts(text, unit=unit)).rig
             self.assertEqual(rig.unit, unit)
@@ -1191,17 +1191,17 @@ class Rectification(Folder):
             (ValueError, "size: the text does not say the size of the images; give (width, height)", lambda: mrfgs.Rectification(sizeless)),
             (ValueError, "size: give (width, height), both above 0", lambda: mrfgs.Rectification(sizeless, (0, 180))),
             (ValueError, "size: give (width, height), both above 0", lambda: mrfgs.Rectification(sizeless, (-240, 180))),
-            (TypeError, "size: give (width, height), two whole numbers", lambda: mrfgs.Rectification(sizeless, left.shape)),
-            (TypeError, "size: give (width, height), two whole numbers", lambda: mrfgs.Rectification(sizeless, 240)),
-            (TypeError, "size: give (width, height), two whole numbers", lambda: mrfgs.Rectification(sizeless, (240.5, 180))),
+            (TypeError, "size: give (width, height), two integers", lambda: mrfgs.Rectification(sizeless, left.shape)),
+            (TypeError, "size: give (width, height), two integers", lambda: mrfgs.Rectification(sizeless, 240)),
+            (TypeError, "size: give (width, height), two integers", lambda: mrfgs.Rectification(sizeless, (240.5, 180))),
             (ValueError, "alpha: give a number from 0 to 1, not 1.5", lambda: mrfgs.Rectification(CAMERAS, alpha=1.5)),
             (ValueError, "alpha", lambda: mrfgs.Rectification(CAMERAS, alpha=float("nan"))),
             (ValueError, "240 x 180 and these are 239 x 180", lambda: by.apply(left[:, 1:], right[:, 1:])),
             (ValueError, "240 x 180 and these are 239 x 180", lambda: by.apply(left, right[:, 1:])),
-            (TypeError, "left: give an array of whole numbers", lambda: by.apply(left > 9, right)),
+            (TypeError, "left: give an array of integers", lambda: by.apply(left > 9, right)),
             (TypeError, "right", lambda: by.apply(left, "right.png")),
             (ValueError, "mask", lambda: by.apply(left, right, mask=np.zeros((3, 3), bool))),
-            (ValueError, "cameras.yml: is of images that are not rectified; take the rig of a Rectification", lambda: mrfgs.Rig(CAMERAS)),
+            (ValueError, "cameras.yml: describes images that are not rectified; use Rectification(...).rig", lambda: mrfgs.Rig(CAMERAS)),
             (ValueError, "the text: the calibration does not say cam0 and doffs and baseline", lambda: mrfgs.Rig(of_texts("ndisp=64\n"))),
             (ValueError, "baseline=0 is not above 0", lambda: mrfgs.Rig(of_texts("cam0=[9 0 2; 0 9 2; 0 0 1]\ndoffs=0\nbaseline=0\n"))),
         ):
@@ -1296,7 +1296,7 @@ class Depth(Folder):
         self.assertTrue(np.array_equal(other.depth(found.disparity), mrfgs.Rig.of(700, 120, size=(80, 60)).depth(found.disparity)))
         self.assertFalse(np.array_equal(other.points(found, left).positions, rig.points(found, left).positions))
         self.assertFalse(np.array_equal(mrfgs.Rig.of(701, 120, size=(80, 60)).depth(found.disparity), rig.depth(found.disparity)))
-        self.refused(ValueError, "Rig.of: does not say the unit of the baseline", lambda: other.millimetres(found.disparity))
+        self.refused(ValueError, "Rig.of: lacks the unit of the baseline", lambda: other.millimetres(found.disparity))
 
     def test_where_there_is_no_depth(self):
         rig = mrfgs.Rig(mrfgs.Calibration.of_texts("cam0=[100 0 2; 0 100 2; 0 0 1]\ndoffs=5\nbaseline=20\n"))
@@ -1325,13 +1325,13 @@ class Depth(Folder):
         self.assertEqual(len(rig.points(changed, left)), 0)
         for error, words, call in (
             (TypeError, "disparity: give an array, such as Matched.disparity", lambda: rig.depth(found)),
-            (TypeError, "divide whole numbers by their scale", lambda: rig.depth(np.zeros((3, 3), np.int16))),
+            (TypeError, "divide integers by their scale", lambda: rig.depth(np.zeros((3, 3), np.int16))),
             (TypeError, "disparity", lambda: rig.depth("d.pfm")),
             (ValueError, "disparity: give an array of shape (height, width)", lambda: rig.depth(np.zeros(3))),
             (ValueError, "disparity: is 80 x 60, and the text is of images of 81 x 60", lambda: sized.depth(found.disparity)),
             (ValueError, "matched: is 80 x 60", lambda: sized.points(found, left)),
             (ValueError, "left: is 79 x 60 and the maps are 80 x 60", lambda: rig.points(found, left[:, 1:])),
-            (TypeError, "left: give an array of whole numbers", lambda: rig.points(found, left > 9)),
+            (TypeError, "left: give an array of integers", lambda: rig.points(found, left > 9)),
             (ValueError, "positions: give an array of shape (N, 3)", lambda: mrfgs.Points(positions[:, :2], colours, confidence)),
             (TypeError, "colours: give an array of shape (N, 3), uint8", lambda: mrfgs.Points(positions, colours / 255, confidence)),
             (ValueError, "unit: give mm, cm, m or unknown", lambda: mrfgs.Points(positions, colours, confidence, "feet")),
@@ -1340,9 +1340,9 @@ class Depth(Folder):
             (OSError, "python.laz", lambda: mrfgs.Points(positions + np.inf, colours, confidence).save(self.folder / "python.laz")),
             (ValueError, "focal: give a number above 0, not -7", lambda: mrfgs.Rig.of(-7, 0.1, size=(8, 6))),
             (ValueError, "baseline: give a number above 0, not inf", lambda: mrfgs.Rig.of(7, np.inf, size=(8, 6))),
-            (ValueError, "size: give (width, height) of the images, whose centre", lambda: mrfgs.Rig.of(7, 0.1)),
+            (ValueError, "size: give (width, height) of the images, to use their centre", lambda: mrfgs.Rig.of(7, 0.1)),
             (ValueError, "size: give (width, height), both above 0", lambda: mrfgs.Rig.of(7, 0.1, size=(0, 6))),
-            (ValueError, "principal_point and doffs: give numbers, not NaN", lambda: mrfgs.Rig.of(7, 0.1, principal_point=(1, np.nan))),
+            (ValueError, "principal_point and doffs: give finite numbers, not NaN", lambda: mrfgs.Rig.of(7, 0.1, principal_point=(1, np.nan))),
             (ValueError, "unit: give mm, cm, m or unknown, not \"feet\"", lambda: mrfgs.Rig.of(7, 0.1, size=(8, 6), unit="feet")),
             (ValueError, "disparity: is 80 x 60, and Rig.of is of images of 8 x 6", lambda: mrfgs.Rig.of(7, 0.1, size=(8, 6)).depth(found.disparity)),
             (OSError, "there is no folder", lambda: points.save(self.folder / "nowhere" / "python.ply")),
@@ -1511,7 +1511,7 @@ class Sequences(Folder):
                 self.assertIs(getattr(led, name), getattr(found, name))
             # Control: only the first frame has no past.
             self.assertEqual(np.array_equal(led.disparity, found.disparity), step == 0, step)
-        self.refused(ValueError, "left: is 120 x 89 and the maps are 120 x 90", lambda: steady.follow(alone[0], left[1:]))
+        self.refused(ValueError, "left: is 120 x 89 but the maps are 120 x 90", lambda: steady.follow(alone[0], left[1:]))
         self.refused(TypeError, "Matched", lambda: steady.follow(alone[0].disparity, left))
 
     def test_a_rig_that_has_turned_is_corrected_as_the_program_does(self):
@@ -1614,7 +1614,7 @@ class Sequences(Folder):
         self.matcher.match(*pair(), 15)
         left, right = pair()
         for error, words, bad in (
-            (TypeError, "pair 1: left: give an array of whole numbers", (left > 9, right)),
+            (TypeError, "pair 1: left: give an array of integers", (left > 9, right)),
             (ValueError, "pair 1: the left image is 80 x 60 and the right one is 79 x 60", (left, right[:, 1:])),
             (TypeError, "pair 1: give two arrays, left and right", left),
             (TypeError, "pair 1: give two arrays, left and right", None),
@@ -1697,7 +1697,7 @@ class Sequences(Folder):
         said = []
         results = self.matcher.match_all(pairs(), 15)
         self.assertEqual(len(list(results)), 2)
-        self.assertIn("in use already", said[0])
+        self.assertIn("already in use", said[0])
         # Another thread may ask for the next one.
         results, found = self.matcher.match_all([pair(seed=1), pair(seed=2)], 15), []
         for _ in range(2):
@@ -1894,7 +1894,7 @@ class Processes(unittest.TestCase):
                 return digest(matcher.match(*pair(), 15).disparity)
 
             print(forked(child, leave=sys.exit) == expected, digest(next(results).disparity) == expected)
-        """, "this iterator was begun before the process was forked, and ends with that; call match_all here\nTrue True")
+        """, "this iterator belongs to the parent of this forked process; call match_all again here\nTrue True")
 
     def test_devices_stay_in_their_process(self):
         if not has_device():
