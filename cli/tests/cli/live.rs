@@ -203,9 +203,9 @@ fn invalid_flags_of_a_node_are_refused() {
     let folder = Folder::new();
     for (line, words) in [
         ("--remap left/image_raw", "--remap & FROM:=TO"),
-        ("--remap left/image_raw:=/a//b", "--remap & /a//b & no name of ROS"),
+        ("--remap left/image_raw:=/a//b", "--remap & /a//b & not a valid ROS name"),
         ("--remap left/image_raw:=right/image_raw", "--remap & /right/image_raw & its own topic"),
-        ("--remap __node:=1", "--remap & no name of a node"),
+        ("--remap __node:=1", "--remap & not a valid node name"),
         ("--domain 233", "--domain & 233"),
         ("--tolerance -1", "--tolerance & from 0 to 3600"),
         ("--also preview", "--also preview & cannot be sent as a ROS message"),

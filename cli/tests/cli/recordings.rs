@@ -465,9 +465,9 @@ fn faulty_recordings_are_reported_in_one_line() {
     for (line, code, done, words) in [
         ("none.mcap OUT", 1, 0, "none.mcap & no such file"),
         ("empty.mcap OUT", 1, 0, "empty.mcap: is empty"),
-        ("words.mcap OUT", 1, 0, "words.mcap: is no MCAP file"),
-        ("words.bag OUT", 1, 0, "words.bag: is no bag of ROS 1"),
-        ("a.db3 OUT", 1, 0, "a.db3 & no database of SQLite"),
+        ("words.mcap OUT", 1, 0, "words.mcap: is not an MCAP file"),
+        ("words.bag OUT", 1, 0, "words.bag: is not a ROS 1 bag"),
+        ("a.db3 OUT", 1, 0, "a.db3 & not an SQLite database"),
         ("cut.mcap OUT", 1, 1, "cut.mcap: is cut off"),
         ("flipped.mcap OUT", 1, 2, "flipped.mcap: the chunk at byte & checksum"),
         ("encoding.mcap OUT", 1, 2, "encoding.mcap:/left/image_rect at 1700000000.100000000 & `abc9`"),
@@ -482,7 +482,7 @@ fn faulty_recordings_are_reported_in_one_line() {
         ("good.mcap OUT --topics /a,/b", 1, 0, "has no topic /a & /left/image_rect, /right/image_rect"),
         ("good.mcap OUT --topics /a", 2, 0, "--topics & left"),
         ("good.mcap OUT --tolerance -1", 2, 0, "--tolerance & from 0"),
-        ("good.mcap OUT --max-pixels 100", 1, 0, "64 x 48 pixels and at most 100"),
+        ("good.mcap OUT --max-pixels 100", 1, 0, "64 x 48 pixels, but at most 100"),
         ("good.mcap good.mcap OUT", 2, 0, "RIGHT & contains both views"),
         ("good.mcap OUT --pairing order", 2, 0, "--pairing & both views"),
         ("good.mcap OUT --also depth", 2, 0, "--also depth & /left/camera_info"),
@@ -552,7 +552,7 @@ fn missing_parts_of_a_bag_are_reported() {
     record(&bag.join("bag_0.mcap"), &good[..2]);
     metadata(&["bag_0.mcap", "bag_1.mcap"], 4);
     run(&folder, &format!("sequence bag maps {RANGE}"))
-        .failed(1, "bag_1.mcap: there is no such file, though metadata.yaml names it & take its line out");
+        .failed(1, "bag_1.mcap: there is no such file, but metadata.yaml lists it & remove its line");
     assert!(!folder.join("maps").exists());
     metadata(&["bag_0.mcap"], 4);
     let told = run(&folder, &format!("sequence bag maps {RANGE}")).succeeded();
