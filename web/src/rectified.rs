@@ -1,4 +1,4 @@
-//! What is known of two cameras, and pairs that are rectified by it or by their own matches.
+//! Calibrations, and pairs rectified by a calibration or by their own matches.
 
 use crate::Thrown;
 use crate::pair::{Cameras, StereoPair};
@@ -8,7 +8,7 @@ use mrfgs::rectification::{Options, Rectification};
 use std::path::Path;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-/// What a calibration says of two cameras, in any form that the program reads.
+/// A stereo calibration in any format that the program reads.
 #[wasm_bindgen]
 pub struct Known {
     known: StereoCalibration,
@@ -17,10 +17,10 @@ pub struct Known {
 
 #[wasm_bindgen]
 impl Known {
-    /// The calibration in these files, each with the name by which errors call it.
+    /// Reads the calibration from these files, whose names appear in errors.
     ///
     /// # Errors
-    /// Where they are no calibration, or lack a value.
+    /// If the files are not a calibration, or a value is missing.
     #[wasm_bindgen(constructor)]
     pub fn new(names: Vec<String>, texts: Vec<String>) -> Thrown<Self> {
         let files: Vec<_> = names.iter().map(Path::new).zip(texts).collect();
@@ -28,37 +28,37 @@ impl Known {
         Ok(Self { known, names: names.join(", ") })
     }
 
-    /// Whether it is Middlebury's calib.txt, which is of images that are rectified already.
+    /// Whether it is Middlebury's calib.txt, which describes images that are already rectified.
     #[wasm_bindgen(getter)]
     pub fn rectified(&self) -> bool {
         self.known.benchmark.is_some()
     }
 
-    /// The number of labels that it gives, from 0 on.
+    /// Number of labels in the calibration, starting at 0.
     #[wasm_bindgen(getter)]
     pub fn labels(&self) -> Option<u32> {
         self.known.benchmark.as_ref()?.ndisp
     }
 
-    /// The width of its images, where it says so.
+    /// Width of the calibrated images, if known.
     #[wasm_bindgen(getter)]
     pub fn width(&self) -> Option<usize> {
         Some(self.known.size?.0)
     }
 
-    /// Their height.
+    /// Height of the calibrated images, if known.
     #[wasm_bindgen(getter)]
     pub fn height(&self) -> Option<usize> {
         Some(self.known.size?.1)
     }
 
-    /// The cameras of images that are rectified already; undefined where it says nothing of them.
+    /// The cameras of rectified images; undefined if the calibration does not describe them.
     ///
     /// # Errors
-    /// Where it lacks a value.
+    /// If a value is missing.
     pub fn cameras(&self, width: usize, height: usize) -> Thrown<Option<Cameras>> {
         let calibration = self.known.of_rectified_images(Some((width, height))).map_err(thrown)?;
-        // Some have the range alone.
+        // Some calibrations contain only the range.
         let told = calibration.filter(|told| told.camera.is_some() || told.ndisp.is_none());
         told.map(|told| Cameras::of(&told)).transpose()
     }
@@ -66,7 +66,7 @@ impl Known {
     /// Rectifies a pair.
     ///
     /// # Errors
-    /// Where the calibration lacks what this takes, or is for images of another size.
+    /// If the calibration is incomplete, or for images of another size.
     pub fn rectify(&self, pair: &StereoPair) -> Thrown<Rectified> {
         let by = Rectification::for_pair(&self.known, &pair.pair, &Options::default()).map_err(thrown)?;
         let calibration = by.calibration().map_err(thrown)?;
@@ -78,7 +78,7 @@ impl Known {
     }
 }
 
-/// A pair that was rectified.
+/// A pair after rectification.
 #[wasm_bindgen]
 pub struct Rectified {
     pair: StereoPair,
@@ -91,7 +91,7 @@ impl Rectified {
     /// Rectifies a pair by its own matches.
     ///
     /// # Errors
-    /// Where these do not tell how.
+    /// If the matches do not determine a rectification.
     #[wasm_bindgen(js_name = "byMatches")]
     pub fn by_matches(pair: &StereoPair) -> Thrown<Rectified> {
         let by = Rectification::of_pair(&pair.pair, &Options::default()).map_err(thrown)?;
@@ -102,13 +102,13 @@ impl Rectified {
         Ok(rectified)
     }
 
-    /// What was done, and how far it can be trusted.
+    /// What was done, and doubts about its accuracy.
     #[wasm_bindgen(getter)]
     pub fn notes(&self) -> Vec<String> {
         self.notes.clone()
     }
 
-    /// The cameras, where they are known. They are given away.
+    /// The cameras, if known. This moves them out.
     pub fn cameras(&mut self) -> Option<Cameras> {
         self.cameras.take()
     }
