@@ -23,7 +23,7 @@ use mrfgs::image::Plane;
 use noise::hash;
 use rayon::prelude::*;
 use sensor::{middle, place};
-use vector::{Frame, dot};
+use vector::{Basis, dot};
 
 pub use paint::{Paint, Pattern, paint};
 pub use sensor::Sensor;
@@ -297,14 +297,14 @@ pub const VIEWER: Vec3 = [0.0, 0.0, -1.0];
 const ENDLESS: f64 = 40.0;
 
 impl World {
-    fn put(&mut self, shape: Shape, centre: Vec3, frame: Frame, paint: Paint) {
+    fn put(&mut self, shape: Shape, centre: Vec3, frame: Basis, paint: Paint) {
         let seed = hash([self.seed, self.bodies.len() as u32, 0, 0]);
         self.bodies.push(Body::new(shape, centre, frame, paint, seed));
     }
 
     /// A rectangle facing `normal`; `half` is half its width and height.
     pub fn card(&mut self, centre: Vec3, normal: Vec3, up: Vec3, half: [f64; 2], paint: Paint) {
-        self.put(Shape::Flat { half, outline: Outline::Rectangle }, centre, Frame::new(normal, up), paint);
+        self.put(Shape::Flat { half, outline: Outline::Rectangle }, centre, Basis::new(normal, up), paint);
     }
 
     /// A plane without visible ends.
@@ -316,11 +316,11 @@ impl World {
     pub fn disc(&mut self, centre: Vec3, normal: Vec3, radius: f64, paint: Paint) {
         let up = if normal[1].abs() > normal[2].abs() { VIEWER } else { UP };
         let shape = Shape::Flat { half: [radius; 2], outline: Outline::Ellipse };
-        self.put(shape, centre, Frame::new(normal, up), paint);
+        self.put(shape, centre, Basis::new(normal, up), paint);
     }
 
     pub fn ball(&mut self, centre: Vec3, radius: f64, axis: Vec3, paint: Paint) {
-        self.put(Shape::Sphere { radius }, centre, Frame::new(axis, VIEWER), paint);
+        self.put(Shape::Sphere { radius }, centre, Basis::new(axis, VIEWER), paint);
     }
 
     /// A round bar between two points, closed at both ends.
@@ -328,14 +328,14 @@ impl World {
         let axis = sub(b, a);
         let half = 0.5 * dot(axis, axis).sqrt();
         let side = if axis[2].abs() > axis[1].abs() { UP } else { VIEWER };
-        self.put(Shape::Tube { radius, half }, mix(a, b, 0.5), Frame::new(axis, side), paint);
+        self.put(Shape::Tube { radius, half }, mix(a, b, 0.5), Basis::new(axis, side), paint);
         self.disc(a, scale(axis, -1.0), radius, paint);
         self.disc(b, axis, radius, paint);
     }
 
     /// A cuboid with its front facing `front`; `half` is half its width, height and depth.
     pub fn block(&mut self, centre: Vec3, front: Vec3, up: Vec3, half: Vec3, paint: Paint) {
-        let frame = Frame::new(front, up);
+        let frame = Basis::new(front, up);
         for axis in 0..3 {
             let [side, top] = [[2, 1], [0, 2], [0, 1]][axis];
             for sign in [-1.0, 1.0] {

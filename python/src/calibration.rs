@@ -32,11 +32,11 @@ pub(crate) struct PyCalibration {
     /// The files, as messages name them.
     pub(crate) names: String,
     /// The arguments, for copies: name and text of each file, unit and crop.
-    made_of: (Vec<(String, String)>, Option<String>, Option<Part>),
+    made_of: (Vec<(String, String)>, Option<String>, Option<Crop>),
 }
 
 /// First column, first row, width and height.
-type Part = (usize, usize, usize, usize);
+type Crop = (usize, usize, usize, usize);
 
 impl PyCalibration {
     /// Converts the argument `calibration`: a Calibration, a path, or several paths.
@@ -56,7 +56,7 @@ impl PyCalibration {
     fn read<'py>(
         files: impl Iterator<Item = Bound<'py, PyAny>>,
         unit: Option<&str>,
-        crop: Option<Part>,
+        crop: Option<Crop>,
     ) -> PyResult<Self> {
         let files = files.map(|file| {
             let path: PathBuf = file.extract().map_err(|error| {
@@ -85,7 +85,7 @@ impl PyCalibration {
     }
 
     /// The calibration in the texts of files, each with a name for messages.
-    fn of_named(files: Vec<(String, String)>, unit: Option<&str>, crop: Option<Part>) -> PyResult<Self> {
+    fn of_named(files: Vec<(String, String)>, unit: Option<&str>, crop: Option<Crop>) -> PyResult<Self> {
         let texts: Vec<_> = files.iter().map(|(name, text)| (Path::new(name), text.clone())).collect();
         let mut cameras = calibration::of_texts(&texts).map_err(|error| match error {
             Error::Calibration(_) => {
@@ -123,7 +123,7 @@ pub(crate) fn unit(text: &str) -> PyResult<Unit> {
 impl PyCalibration {
     #[new]
     #[pyo3(signature = (*files, unit=None, crop=None))]
-    fn new(files: &Bound<PyTuple>, unit: Option<&str>, crop: Option<Part>) -> PyResult<Self> {
+    fn new(files: &Bound<PyTuple>, unit: Option<&str>, crop: Option<Crop>) -> PyResult<Self> {
         Self::read(files.iter(), unit, crop)
     }
 
@@ -131,7 +131,7 @@ impl PyCalibration {
     /// "text 2".
     #[staticmethod]
     #[pyo3(signature = (*texts, unit=None, crop=None))]
-    fn of_texts(texts: Vec<String>, unit: Option<&str>, crop: Option<Part>) -> PyResult<Self> {
+    fn of_texts(texts: Vec<String>, unit: Option<&str>, crop: Option<Crop>) -> PyResult<Self> {
         let name = |i: usize| if texts.len() == 1 { "the text".into() } else { format!("text {}", i + 1) };
         Self::of_named((0..).map(name).zip(texts.clone()).collect(), unit, crop)
     }
@@ -174,7 +174,7 @@ impl PyCalibration {
         _: &Bound<PyType>,
         files: Vec<(String, String)>,
         unit: Option<&str>,
-        crop: Option<Part>,
+        crop: Option<Crop>,
     ) -> PyResult<Self> {
         Self::of_named(files, unit, crop)
     }

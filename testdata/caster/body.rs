@@ -1,7 +1,7 @@
 //! Bodies and their intersections with rays.
 
 use super::paint::Paint;
-use super::vector::{Frame, Vec3, add, dot, scale, sub, unit};
+use super::vector::{Basis, Vec3, add, dot, scale, sub, unit};
 
 /// The points `from + t * along`. For a camera's ray t is the depth, because `along` has z = 1.
 pub struct Ray {
@@ -40,7 +40,7 @@ pub enum Shape {
 pub struct Body {
     shape: Shape,
     centre: Vec3,
-    frame: Frame,
+    frame: Basis,
     /// Square of a radius that slightly exceeds the body's.
     reach: f64,
     pub paint: Paint,
@@ -48,7 +48,7 @@ pub struct Body {
 }
 
 impl Body {
-    pub fn new(shape: Shape, centre: Vec3, frame: Frame, paint: Paint, seed: u32) -> Self {
+    pub fn new(shape: Shape, centre: Vec3, frame: Basis, paint: Paint, seed: u32) -> Self {
         let reach = 1.001
             * match shape {
                 Shape::Flat { half, .. } => half[0] * half[0] + half[1] * half[1],

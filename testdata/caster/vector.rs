@@ -32,9 +32,9 @@ pub fn mix(a: Vec3, b: Vec3, t: f64) -> Vec3 {
 
 /// An orthonormal frame: the body's x, y and z axes.
 #[derive(Clone, Copy)]
-pub struct Frame(pub [Vec3; 3]);
+pub struct Basis(pub [Vec3; 3]);
 
-impl Frame {
+impl Basis {
     /// A frame with z along `z`, and y as close to `y` as possible.
     pub fn new(z: Vec3, y: Vec3) -> Self {
         let z = unit(z);

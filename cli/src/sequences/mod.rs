@@ -94,7 +94,7 @@ impl Source {
 }
 
 /// A pair at one point in time.
-pub(crate) struct Frame {
+pub(crate) struct FramePair {
     /// The stem of the left file, the time of a recorded image in seconds, or the frame number from 000000 on.
     pub(crate) name: String,
     /// The ROS header of a recorded left view.
@@ -282,7 +282,7 @@ impl Frames {
         }
     }
 
-    fn frame(&mut self, (FrameInfo { name, header }, [left, right]): Rasters) -> Result<Frame> {
+    fn frame(&mut self, (FrameInfo { name, header }, [left, right]): Rasters) -> Result<FramePair> {
         let name = name.unwrap_or_else(|| format!("{:06}", self.count));
         let left = match &self.mask {
             Some(mask) => left.masked_by(mask.clone()).map_err(|e| named(e, &name))?,
@@ -298,7 +298,7 @@ impl Frames {
             )));
         }
         self.count += 1;
-        Ok(Frame { name, header, pair })
+        Ok(FramePair { name, header, pair })
     }
 }
 
@@ -311,7 +311,7 @@ fn named(error: Error, name: &str) -> Error {
 }
 
 impl Iterator for Frames {
-    type Item = Result<Frame>;
+    type Item = Result<FramePair>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let rasters = self.rasters()?;

@@ -25,7 +25,7 @@ use crate::outputs::messages::Messages;
 use crate::outputs::{Cameras, Files, MapArgs, files, is_printed};
 use crate::pairs::folder::CALIBRATION;
 use crate::pairs::input::{Calib, Input};
-use crate::sequences::{Frame, Frames, Layout, Pairing, RawFrames, Recorded, Rectifier, raw_frames};
+use crate::sequences::{FramePair, Frames, Layout, Pairing, RawFrames, Recorded, Rectifier, raw_frames};
 use crate::{console, ffmpeg, plan, stop};
 
 use kind::Kind;
@@ -192,7 +192,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let films: Vec<_> = frames.films().map(|(film, complaint)| (film.to_owned(), complaint)).collect();
     // The first frame determines the range, and the size that all later frames must have.
     let (first, frames) = pipeline::patiently(move || (frames.next(), frames))?;
-    let Frame { name, header, pair } =
+    let FramePair { name, header, pair } =
         first.ok_or_else(|| Error::read(&args.left, "contains no frame"))??;
     let sign = Sign::default();
     let cameras = args.maps.also.take_cameras();
@@ -265,7 +265,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let pipeline = Pipeline { matcher, range, region, files, rectified, recalibrate, quiet: args.quiet };
     let known = input.calibration().and_then(|known| Rectification::of_rectified(known, size).ok());
     let rectifier = Rectifier::new(input.rectification, known, range, recalibrate);
-    let first = Frame { name, header, pair: input.pair };
+    let first = FramePair { name, header, pair: input.pair };
     let ended = pipeline.run(first, frames, rectifier, &mut sink);
     if !args.quiet {
         for (film, complaint) in &films {

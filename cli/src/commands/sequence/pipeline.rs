@@ -18,7 +18,7 @@ use crate::failure::{Failure, Result};
 use crate::outputs::{Files, MatchRecord};
 use crate::pairs::input;
 use crate::progress::Counter;
-use crate::sequences::{Frame, Frames, Rectifier, turned};
+use crate::sequences::{FramePair, Frames, Rectifier, turned};
 use crate::text::plural;
 use crate::{console, remedy, stop};
 
@@ -51,7 +51,7 @@ struct WriterNeeds {
 }
 
 /// A rectified frame with the turn of the right camera so far, or the error that ended the frames.
-type NextFrame = Result<(Frame, Option<Turn>)>;
+type NextFrame = Result<(FramePair, Option<Turn>)>;
 
 impl Pipeline {
     /// Matches `first`, which is already rectified, and all `frames`, which `rectifier` rectifies, and writes the results.
@@ -60,7 +60,7 @@ impl Pipeline {
     /// Errors of reading, matching and writing, and a stop by the user. Earlier results are written in any case.
     pub(super) fn run(
         mut self,
-        first: Frame,
+        first: FramePair,
         frames: Frames,
         mut rectifier: Rectifier,
         sink: &mut Sink,
@@ -113,7 +113,7 @@ impl Pipeline {
     /// Matches all frames and passes the results on.
     fn matched(
         &mut self,
-        first: (Frame, Option<Turn>),
+        first: (FramePair, Option<Turn>),
         frames: &Receiver<NextFrame>,
         takes: WriterNeeds,
         start: Instant,
@@ -245,9 +245,9 @@ fn read(frames: Frames, mut rectifier: Rectifier, mut told: [bool; 2], to: &Sync
                 input::warn([Warning::Damaged { doubt: doubt.clone() }]);
             }
         }
-        let rectified = |Frame { name, header, pair }: Frame| {
+        let rectified = |FramePair { name, header, pair }: FramePair| {
             let (pair, turn) = rectifier.rectified(pair)?;
-            Ok((Frame { name, header, pair }, turn))
+            Ok((FramePair { name, header, pair }, turn))
         };
         let frame = frame.map_err(Failure::from).and_then(rectified);
         let failed = frame.is_err();
