@@ -2,7 +2,7 @@
  *
  *     match-c LEFT.pnm RIGHT.pnm MAX-DISPARITY MAP.pfm CONFIDENCE.pgm VALIDITY.pgm RIGHT-MAP.pfm SIGMA.pfm REGION.pfm STEADY.pfm
  *
- * Then tests every error that a caller can cause. */
+ * Then it makes every mistake that a caller can make. */
 #include "pnm.h"
 
 #include <mrfgs.h>

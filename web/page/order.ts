@@ -28,7 +28,7 @@ function compared(a: string, b: string): number {
     return [...words, ...both.map(([one, other]) => lower(one, other))].find((order) => order !== 0) ?? 0;
 }
 
-/** Orders two views, left one first; keeps their order if the names do not tell. */
+/** Two views, the left one first; as they came where their names do not tell. */
 export function inOrder<T extends { name: string }>(a: T, b: T): [T, T] {
     return compared(a.name, b.name) > 0 ? [b, a] : [a, b];
 }

@@ -60,14 +60,14 @@ export interface Text {
     text: string;
 }
 
-/** Contents of a calibration. */
+/** What a calibration says. */
 export interface Known {
-    /** Whether its format describes images that are already rectified. */
+    /** Of images that are rectified already, by its form. */
     rectified: boolean;
-    /** Labels 0 to ndisp - 1. */
+    /** Labels 0 to ndisp - 1, as the program takes them. */
     range: Range | undefined;
     size: { width: number; height: number } | undefined;
-    /** Cameras of rectified images. */
+    /** Those of images that are rectified already. */
     cameras: Cameras | undefined;
 }
 
@@ -153,9 +153,9 @@ export interface Calls {
     compare(device: Device): Comparison;
     picture(map: Map, colours: Colours): Picture;
     file(output: Output): Uint8Array<ArrayBuffer>;
-    /** The contents of calibration files, for images of this size. */
+    /** What the files of a calibration say of images of this size. */
     calibration(files: Text[], width: number, height: number): Known;
-    /** Replaces the pair by a rectified one: by a calibration, or by its matches without one. */
+    /** Puts a rectified pair in the place of the pair: by a calibration, or without one by matches. */
     rectify(files: Text[] | undefined): Rectified;
     points(cameras: Cameras): Cloud;
     ply(cameras: Cameras, leastConfidence: number): Uint8Array<ArrayBuffer>;

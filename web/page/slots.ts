@@ -183,7 +183,7 @@ export class Slots {
         }
     }
 
-    /** Takes a calibration without views. */
+    /** A calibration without views. */
     private calibrate(files: Text[]): void {
         const { left, right } = this.views;
         if (left && right && this.scene === undefined) {

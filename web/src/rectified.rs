@@ -28,37 +28,37 @@ impl Known {
         Ok(Self { known, names: names.join(", ") })
     }
 
-    /// Whether it is Middlebury's calib.txt, which describes images that are already rectified.
+    /// Whether it is Middlebury's calib.txt, which is of images that are rectified already.
     #[wasm_bindgen(getter)]
     pub fn rectified(&self) -> bool {
         self.known.benchmark.is_some()
     }
 
-    /// Number of labels in the calibration, starting at 0.
+    /// The number of labels that it gives, from 0 on.
     #[wasm_bindgen(getter)]
     pub fn labels(&self) -> Option<u32> {
         self.known.benchmark.as_ref()?.ndisp
     }
 
-    /// Width of the calibrated images, if known.
+    /// The width of its images, where it says so.
     #[wasm_bindgen(getter)]
     pub fn width(&self) -> Option<usize> {
         Some(self.known.size?.0)
     }
 
-    /// Height of the calibrated images, if known.
+    /// Their height.
     #[wasm_bindgen(getter)]
     pub fn height(&self) -> Option<usize> {
         Some(self.known.size?.1)
     }
 
-    /// The cameras of rectified images; undefined if the calibration does not describe them.
+    /// The cameras of images that are rectified already; undefined where it says nothing of them.
     ///
     /// # Errors
-    /// If a value is missing.
+    /// Where it lacks a value.
     pub fn cameras(&self, width: usize, height: usize) -> Thrown<Option<Cameras>> {
         let calibration = self.known.of_rectified_images(Some((width, height))).map_err(thrown)?;
-        // Some calibrations contain only the range.
+        // Some have the range alone.
         let told = calibration.filter(|told| told.camera.is_some() || told.ndisp.is_none());
         told.map(|told| Cameras::of(&told)).transpose()
     }
@@ -78,7 +78,7 @@ impl Known {
     }
 }
 
-/// A pair after rectification.
+/// A pair that was rectified.
 #[wasm_bindgen]
 pub struct Rectified {
     pair: StereoPair,
