@@ -1,8 +1,7 @@
-//! Every stage and the whole match, the same cases on every backend: `cargo bench`.
+//! Benchmarks of every stage and of whole matches, with the same cases on every backend: `cargo bench`.
 //!
-//! The cases are the pairs that `mrfgs bench` makes up: the small one, and with `MRFGS_BENCH_LARGE=1` the large one too,
-//! which takes long and about 20 GB a backend. `cargo bench -- dependency` runs one stage. The GPU rows are missing where there is no
-//! driver, and say so.
+//! The cases are the generated pairs of `mrfgs bench`: the small one, and with `MRFGS_BENCH_LARGE=1` also the large one, which takes long
+//! and about 20 GB per backend. `cargo bench -- dependency` runs one stage. Without a driver, the GPU rows are skipped with a note.
 
 #[path = "../cli/src/commands/bench/synthetic.rs"]
 mod synthetic;
@@ -21,7 +20,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 use synthetic::{LARGE, SMALL, Synthetic};
 
-/// The pairs, and the presets that each is matched by: what the paper's asks of the large one fills most memories.
+/// The pairs with their presets; the large pair with the preset paper would not fit into most memories.
 fn cases() -> Vec<(Synthetic, &'static [&'static str])> {
     let large = std::env::var("MRFGS_BENCH_LARGE").is_ok_and(|v| v != "0" && !v.is_empty());
     let mut cases = vec![(SMALL, &["default", "paper"][..])];
@@ -29,7 +28,7 @@ fn cases() -> Vec<(Synthetic, &'static [&'static str])> {
     cases
 }
 
-/// What is timed: a name, and the stages that belong to it.
+/// The timed groups of stages, with names.
 fn groups(plan: &Plan) -> Vec<(&'static str, Vec<Stage>)> {
     let pyramid = (1..plan.levels.len()).map(Stage::Pyramid).collect();
     vec![
@@ -62,7 +61,7 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
                 .measurement_time(Duration::from_secs(2))
                 .warm_up_time(Duration::from_millis(500));
 
-            // Whatever a stage needs is there, and the device is warm.
+            // A full match first computes the inputs of all stages and warms up the device.
             block_on(engine::solve(backend, &program, &pair, &mut |_| ControlFlow::Continue(()), None))
                 .expect("a match");
             for (stage, stages) in groups(&plan) {

@@ -1,4 +1,4 @@
-//! Gives the shared library its name. Until 1.0, each minor version may break those before.
+//! Sets the soname of the shared library. Until 1.0 each minor version may be incompatible.
 
 fn main() {
     let part = |name: &str| std::env::var(format!("CARGO_PKG_VERSION_{name}")).unwrap_or_default();

@@ -1,15 +1,14 @@
-// Compiles the shaders in a folder, NUMBER.STAGE.ENTRY-POINT.wgsl each, with Dawn: see scripts/check-wgsl, which runs this where
-// Dawn is found.
+// Compiles the shaders in a folder (NUMBER.STAGE.ENTRY-POINT.wgsl) with Dawn; run by scripts/check-wgsl, which installs Dawn.
 import { readFileSync, readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { create, globals } from 'webgpu';
 
 Object.assign(globalThis, globals);
-// Checks everything and runs nothing.
+// The null backend validates everything and runs nothing.
 const gpu = create(['backend=null']);
 const device = await (await gpu.requestAdapter()).requestDevice();
 
-// What is wrong with a shader, or null.
+// The fault of a shader, or null.
 async function fault(code, entryPoint) {
     device.pushErrorScope('validation');
     const module = device.createShaderModule({ code });
@@ -31,10 +30,10 @@ function end(message, status) {
     process.exit(status);
 }
 
-// Controls: naga takes both, and the second has one invocation too many for WebGPU's limits.
+// Controls: naga accepts both broken shaders; the second exceeds WebGPU's limit of invocations by one.
 const main = (size, body) => `@compute @workgroup_size(${size}) fn main() { ${body} }`;
 if (await fault(main(256, 'let a = true || (true && false);'), 'main')) {
-    end('check-wgsl: a sound shader is refused', 1);
+    end('check-wgsl: a valid shader was rejected', 1);
 }
 for (const broken of [main(256, 'let a = true || true && false;'), main(257, '')]) {
     if (!(await fault(broken, 'main'))) {

@@ -1,4 +1,4 @@
-// Subscribes to a running sequence as Foxglove does: see scripts/viewer, which runs this where its packages are found.
+// Subscribes to a running sequence like Foxglove. scripts/viewer runs this in the folder with its packages.
 import { spawn, spawnSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -22,7 +22,7 @@ function check(what, holds) {
     }
 }
 
-// Two views of a random plane, side by side as a stream has them, and as files.
+// Two views of a random plane: side by side as a stream has them, and as files.
 let seed = 1;
 const random = () => (seed = (seed * 48271) % 2147483647) % 256;
 const wide = width + shift;
@@ -35,7 +35,7 @@ views.forEach((pixels, side) => writeFileSync(join(work, `${side}.ppm`), Buffer.
 const matched = spawnSync(MRFGS, ['match', join(work, '0.ppm'), join(work, '1.ppm'), join(work, 'map.pfm'), '--also', 'depth,points', ...common], { encoding: 'utf8' });
 check(`match: ${matched.stderr}`, matched.status === 0);
 
-// The floats of a PFM file, whose last row comes first.
+// The values of a PFM file, which stores the last row first.
 function pfm(name) {
     const file = readFileSync(join(work, name));
     const all = new Float32Array(new Uint8Array(file.subarray(file.length - 4 * width * height)).buffer);
@@ -65,13 +65,13 @@ async function until(what, holds) {
         }
         await wait(100);
     }
-    check(`in 30 s: not ${what}; it said ${run.said}`, false);
+    check(`timed out after 30 s waiting for ${what}; the program printed ${run.said}`, false);
 }
 
 await until('an address', () => /open (ws:\S+) in Foxglove/.test(run.said));
 const [, address] = /open (ws:\S+) in Foxglove/.exec(run.said);
 
-// Everything that a viewer gets: the last message of each topic.
+// Connects a viewer and checks the last message of each topic.
 async function looked(Socket, protocols) {
     const client = new FoxgloveClient({ ws: new Socket(address, protocols) });
     const [channels, readers, found] = [new Map(), new Map(), new Map()];
@@ -100,14 +100,14 @@ async function looked(Socket, protocols) {
 
 await looked(WebSocket, ['foxglove.sdk.v1']);
 await looked(WebSocket, ['foxglove.websocket.v1']);
-// One that stops reading holds nothing up, and one of another protocol is refused.
+// A client that stops reading does not hold up others, and an unknown subprotocol is refused.
 const idle = new WebSocket(address, ['foxglove.sdk.v1']);
 await new Promise((resolve) => idle.on('open', resolve));
 idle._socket.pause();
 const other = new WebSocket(address, ['chat']);
 await new Promise((resolve) => other.on('error', resolve));
 await looked(WebSocket, ['foxglove.sdk.v1']);
-// The port is taken.
+// A port that is in use.
 const taken = started(address);
 taken.child.stdin.on('error', () => {});
 taken.child.stdin.write(frame);
@@ -116,5 +116,5 @@ check('a port that is taken', (await taken.ended) === 1 && /^mrfgs: cannot write
 clearInterval(feeding);
 run.child.stdin.end();
 check(`the end: ${run.said}`, (await run.ended) === 0 && / frames of 240 x 180/.test(run.said));
-console.log('viewer: disparities, depths and points with the bits of match, by two versions of the protocol');
+console.log('viewer: disparities, depths and points are identical to those of match, with both versions of the protocol');
 process.exit(0);

@@ -1,17 +1,16 @@
-//! A small ray-caster with two eyes. It knows no scene: `scenes.rs` has those.
+//! A small ray caster with two cameras. The scenes are in `scenes.rs`.
 //!
-//! A [`World`] is a handful of bodies (flat pieces, spheres, tubes) in front of two parallel cameras. A ray through
-//! any point of either image meets the bodies in closed form, so both views, the disparity of both and what one
-//! hides from the other come from the same exact geometry: nothing is warped, nothing interpolated.
+//! A [`World`] is a few bodies (planar pieces, spheres, tubes) in front of two parallel cameras. Rays intersect the bodies in closed form,
+//! so both views, both disparity maps and the occlusions come from the same exact geometry: nothing is warped or interpolated.
 //!
-//! What a body is, what it is painted with and what records its light are rooms of their own.
+//! Shapes, paints and sensors have modules of their own.
 //!
-//! Units: the left and right eye look along z from (-b/2, 0, 0) and (b/2, 0, 0), unless the rig stands elsewhere; x
-//! points right, y down. At depth 1 an image is one unit high, and the disparity there is [`REACH`] times the largest
-//! label; at depth z it is that over z. Nothing visible is nearer than depth 1.
+//! Units: the cameras look along z from (-b/2, 0, 0) and (b/2, 0, 0), plus the position of the rig; x points right, y down. At depth 1 an
+//! image is one unit high, and the disparity is [`REACH`] times the largest label; at depth z it is that divided by z. Nothing visible is
+//! nearer than depth 1.
 //!
-//! Arithmetic is limited to + - * / sqrt and integer hashes, which IEEE 754 defines to the last bit: every machine
-//! renders the same bytes. Pixel (x, y) has its centre at (x, y).
+//! Arithmetic is limited to + - * / sqrt and integer hashes, which are exact by IEEE 754, so that every machine renders the same bytes.
+//! Pixel (x, y) has its centre at (x, y).
 
 mod body;
 mod noise;
@@ -24,36 +23,36 @@ use mrfgs::image::Plane;
 use noise::hash;
 use rayon::prelude::*;
 use sensor::{middle, place};
-use vector::{Frame, dot};
+use vector::{Basis, dot};
 
 pub use paint::{Paint, Pattern, paint};
 pub use sensor::Sensor;
 pub use vector::{Vec3, add, mix, scale, sub, unit};
 
-/// A rendered stereo pair with its exact truth.
+/// A rendered stereo pair with exact ground truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// The name, which is the folder's too.
+    /// Name of the scene and of its folder.
     pub name: &'static str,
-    /// The reference view.
+    /// The left view, which is the reference.
     pub left: Plane<[u8; 3]>,
-    /// The other view.
+    /// The right view.
     pub right: Plane<[u8; 3]>,
-    /// Disparity at each pixel centre of the left view: left x is seen at x - d in the right view.
+    /// Disparity at the pixel centres of the left view: left x matches right x - d.
     pub truth: Plane<f32>,
-    /// Disparity at each pixel centre of the right view: right x is seen at x + d in the left view.
+    /// Disparity at the pixel centres of the right view: right x matches left x + d.
     pub truth_right: Plane<f32>,
-    /// 255 where the point at the left pixel's centre is seen in the right view too, 128 where something hides it
-    /// there or it falls outside. 0 (unknown) never occurs.
+    /// 255 where the point at the centre of the left pixel is visible in the right view, 128 where it is occluded or outside. 0 (unknown)
+    /// never occurs.
     pub mask: Plane<u8>,
-    /// Number of labels 0 ..= labels - 1 that is enough to search (`ndisp`).
+    /// Number of labels to search, 0 ..= labels - 1 (`ndisp`).
     pub labels: u32,
-    /// What recorded the left and the right view.
+    /// Sensors of the left and the right view.
     pub sensors: [Sensor; 2],
 }
 
 impl Scene {
-    /// What `calib.txt` holds: the cameras, in world units, which are metres, and the labels to search.
+    /// The content of `calib.txt`: cameras, baseline in metres, and number of labels.
     pub fn calibration(&self) -> String {
         let (width, height) = self.left.size();
         // An image is one unit high at depth 1.
@@ -68,17 +67,17 @@ impl Scene {
 
 // ---------------------------------------------------------------------------------------------- the two cameras
 
-/// Disparity at depth 1, as a part of the largest label.
+/// Disparity at depth 1, as a fraction of the largest label.
 const REACH: f64 = 0.95;
 
-/// Two parallel cameras before a world.
+/// Two parallel cameras in front of a world.
 struct Rig<'a> {
     world: &'a World,
     width: usize,
     height: usize,
     /// Disparity in pixels at depth 1.
     unit_disparity: f64,
-    /// A pixel is the mean of `grid` x `grid` samples.
+    /// Each pixel averages `grid` x `grid` samples.
     grid: usize,
 }
 
@@ -89,11 +88,11 @@ enum Side {
 }
 
 impl World {
-    /// Both views and their truth.
+    /// Renders both views and their ground truth.
     ///
     /// # Panics
-    /// When no pixel or no label is asked for, and when the image is more than three times as wide as high or its rows
-    /// are fewer than half the labels: slanted walls would come too close at its sides.
+    /// If there are no pixels or no labels, the image is more than three times as wide as high, or it has fewer rows than half the labels:
+    /// slanted walls would come too close at its sides.
     pub fn shoot(&self, name: &'static str, width: usize, height: usize, labels: u32) -> Scene {
         assert!(
             width > 0 && height > 0 && labels > 0,
@@ -102,13 +101,13 @@ impl World {
         assert!(width <= 3 * height, "{width} x {height} pixels: the scenes are not that wide");
         assert!(labels as usize <= 2 * height, "{labels} labels are too many for {height} rows");
         let unit_disparity = REACH * f64::from(labels - 1);
-        // Megapixels would take minutes at the quality of the small ones.
+        // Large images would take minutes with as many samples as small ones.
         let grid = if width * height > 1 << 20 { 2 } else { 4 };
         Rig { world: self, width, height, unit_disparity, grid }.shoot(name, labels)
     }
 
-    /// What a camera at `eye` sees, as a sensor of its own records it. `ray` leads through a pixel, by 1 along its axis; `pixel` is how
-    /// wide one is at depth 1.
+    /// The image that a camera at `eye` records with its own sensor. `ray` gives the ray through a pixel, with length 1 along the optical
+    /// axis; `pixel` is the width of a pixel at depth 1.
     pub fn photograph(
         &self,
         size: (usize, usize),
@@ -130,7 +129,7 @@ impl World {
         })
     }
 
-    /// The depths that a camera at `eye` sees along its axis. `ray` leads through a pixel, by 1 along that axis.
+    /// The depths along the optical axis of a camera at `eye`. `ray` gives the ray through a pixel, with length 1 along that axis.
     pub fn depths(
         &self,
         (width, height): (usize, usize),
@@ -164,7 +163,7 @@ impl Rig<'_> {
         Plane::new(self.width, self.height, data)
     }
 
-    /// The ray through the point (x, y) of an image.
+    /// The ray through the image point (x, y).
     fn ray(&self, side: Side, x: f64, y: f64) -> Ray {
         let scale = self.height as f64;
         let half_base = 0.5 * self.unit_disparity / scale;
@@ -177,13 +176,13 @@ impl Rig<'_> {
         self.unit_disparity / self.world.nearest(&self.ray(side, x, y)).0
     }
 
-    /// Whether what the left view shows at (x, y) is the frontmost thing in the right view as well.
+    /// Whether the point at (x, y) of the left view is also visible in the right view.
     fn seen_twice(&self, x: f64, y: f64) -> bool {
         let d = self.disparity(Side::Left, x, y);
         x >= d && self.disparity(Side::Right, x - d, y) <= d * (1.0 + 1e-9)
     }
 
-    /// One view as its sensor records it.
+    /// One view as recorded by its sensor.
     fn picture(&self, side: Side) -> Plane<[u8; 3]> {
         let sensor = match side {
             Side::Left => &self.world.sensors[0],
@@ -196,7 +195,7 @@ impl Rig<'_> {
             let mut sum = [0.0; 3];
             for i in 0..samples {
                 let ray = self.ray(side, place(x, i % grid), place(y, i / grid) - sensor.lower);
-                // Each sample looks at another part of the lamp, no two of them at one height or one width.
+                // Stratifies the samples of the lamp: no two share a row or a column.
                 let lamp = [part(i, samples), part(7 * i % samples, samples)];
                 sum = add(sum, self.world.colour(&ray, lamp, 1.0 / self.height as f64));
             }
@@ -207,29 +206,29 @@ impl Rig<'_> {
 
 // ---------------------------------------------------------------------------------------------------- the light
 
-/// Bodies, and who looks at them.
+/// Bodies and the stereo rig that looks at them.
 pub struct World {
     bodies: Vec<Body>,
-    /// The middle between the eyes.
+    /// Midpoint between the cameras.
     pub rig: Vec3,
     pub sensors: [Sensor; 2],
     seed: u32,
 }
 
-/// Towards the lamp: over the viewer's left shoulder.
+/// Direction of the lamp: over the viewer's left shoulder.
 const LAMP: Vec3 = [-0.45, -0.8, -0.65];
 
-/// How far the lamp reaches sideways, as a part of its distance: the softness of shadows.
+/// Width of the lamp relative to its distance: the softness of shadows.
 const LAMP_SIZE: f64 = 0.16;
 
-/// Where a ray meets a body.
+/// Intersection of a ray and a body.
 struct Met<'a> {
     body: &'a Body,
     depth: f64,
     point: Vec3,
-    /// The point in the body's own coordinates.
+    /// The point in body coordinates.
     local: Vec3,
-    /// Towards the side that the ray comes from.
+    /// Normal on the side of the ray's origin.
     normal: Vec3,
 }
 
@@ -238,7 +237,7 @@ impl World {
         Self { bodies: Vec::new(), rig: [0.0; 3], sensors: [2 * seed, 2 * seed + 1].map(Sensor::new), seed }
     }
 
-    /// Depth and index of the body that the ray meets first.
+    /// Depth and index of the first body that the ray intersects.
     fn nearest(&self, ray: &Ray) -> (f64, Option<usize>) {
         let mut first = (f64::INFINITY, None);
         for (i, body) in self.bodies.iter().enumerate() {
@@ -249,8 +248,8 @@ impl World {
         first
     }
 
-    /// The colour that a camera's ray brings home, lit from the given part of the lamp (each -0.5 ..= 0.5). `pixel`
-    /// is the width of a pixel at depth 1. Where surfaces are matt, a point has one colour whoever looks at it.
+    /// The colour seen along a camera's ray, lit from a point of the lamp (`part`, each -0.5 ..= 0.5). `pixel` is the width of a pixel at
+    /// depth 1. On matt surfaces the colour does not depend on the viewpoint.
     fn colour(&self, ray: &Ray, part: [f64; 2], pixel: f64) -> Vec3 {
         let Some(met) = self.meet(ray) else { return [0.0; 3] };
         let own = self.matt(&met, part, met.depth * pixel);
@@ -264,7 +263,7 @@ impl World {
         add(own, scale(shown.unwrap_or_default(), gloss))
     }
 
-    /// What the ray meets first.
+    /// The first intersection of the ray.
     fn meet(&self, ray: &Ray) -> Option<Met<'_>> {
         let (depth, Some(i)) = self.nearest(ray) else { return None };
         let body = &self.bodies[i];
@@ -276,7 +275,7 @@ impl World {
         Some(Met { body, depth, point, local, normal })
     }
 
-    /// The light that leaves a point of a surface alike in all directions; no detail is much finer than `detail`.
+    /// Diffuse light from a point of a surface; details finer than about `detail` are suppressed.
     fn matt(&self, met: &Met, part: [f64; 2], detail: f64) -> Vec3 {
         let &Met { body, point, local, normal, .. } = met;
         let [a, b] = part.map(|p| LAMP_SIZE * p);
@@ -294,21 +293,21 @@ impl World {
 
 pub const UP: Vec3 = [0.0, -1.0, 0.0];
 pub const VIEWER: Vec3 = [0.0, 0.0, -1.0];
-/// Half the side of what has no visible end.
+/// Half the side of planes without a visible end.
 const ENDLESS: f64 = 40.0;
 
 impl World {
-    fn put(&mut self, shape: Shape, centre: Vec3, frame: Frame, paint: Paint) {
+    fn put(&mut self, shape: Shape, centre: Vec3, frame: Basis, paint: Paint) {
         let seed = hash([self.seed, self.bodies.len() as u32, 0, 0]);
         self.bodies.push(Body::new(shape, centre, frame, paint, seed));
     }
 
-    /// A rectangle that faces `normal`; `half` its width and height.
+    /// A rectangle facing `normal`; `half` is half its width and height.
     pub fn card(&mut self, centre: Vec3, normal: Vec3, up: Vec3, half: [f64; 2], paint: Paint) {
-        self.put(Shape::Flat { half, outline: Outline::Rectangle }, centre, Frame::new(normal, up), paint);
+        self.put(Shape::Flat { half, outline: Outline::Rectangle }, centre, Basis::new(normal, up), paint);
     }
 
-    /// A plane without visible end.
+    /// A plane without visible ends.
     pub fn plane(&mut self, point: Vec3, normal: Vec3, paint: Paint) {
         let up = if normal[1].abs() > normal[2].abs() { VIEWER } else { UP };
         self.card(point, normal, up, [ENDLESS; 2], paint);
@@ -317,11 +316,11 @@ impl World {
     pub fn disc(&mut self, centre: Vec3, normal: Vec3, radius: f64, paint: Paint) {
         let up = if normal[1].abs() > normal[2].abs() { VIEWER } else { UP };
         let shape = Shape::Flat { half: [radius; 2], outline: Outline::Ellipse };
-        self.put(shape, centre, Frame::new(normal, up), paint);
+        self.put(shape, centre, Basis::new(normal, up), paint);
     }
 
     pub fn ball(&mut self, centre: Vec3, radius: f64, axis: Vec3, paint: Paint) {
-        self.put(Shape::Sphere { radius }, centre, Frame::new(axis, VIEWER), paint);
+        self.put(Shape::Sphere { radius }, centre, Basis::new(axis, VIEWER), paint);
     }
 
     /// A round bar between two points, closed at both ends.
@@ -329,14 +328,14 @@ impl World {
         let axis = sub(b, a);
         let half = 0.5 * dot(axis, axis).sqrt();
         let side = if axis[2].abs() > axis[1].abs() { UP } else { VIEWER };
-        self.put(Shape::Tube { radius, half }, mix(a, b, 0.5), Frame::new(axis, side), paint);
+        self.put(Shape::Tube { radius, half }, mix(a, b, 0.5), Basis::new(axis, side), paint);
         self.disc(a, scale(axis, -1.0), radius, paint);
         self.disc(b, axis, radius, paint);
     }
 
-    /// A cuboid whose front looks along `front`; `half` its width, height and depth.
+    /// A cuboid with its front facing `front`; `half` is half its width, height and depth.
     pub fn block(&mut self, centre: Vec3, front: Vec3, up: Vec3, half: Vec3, paint: Paint) {
-        let frame = Frame::new(front, up);
+        let frame = Basis::new(front, up);
         for axis in 0..3 {
             let [side, top] = [[2, 1], [0, 2], [0, 1]][axis];
             for sign in [-1.0, 1.0] {

@@ -1,8 +1,8 @@
-//! Counts the pixels in which two matches differ, in any of four maps. Each folder holds what
-//! `mrfgs match LEFT RIGHT map.pfm --also raw,confidence,validity` has written:
-//! `cargo run --release --example differing-pixels FOLDER FOLDER` prints the pixels of a map, and how many of them differ.
+//! Counts the pixels in which two matches differ in any of four maps. Each folder holds the output of `mrfgs match LEFT RIGHT map.pfm
+//! --also raw,confidence,validity`. `cargo run --release --example differing-pixels FOLDER FOLDER` prints the number of pixels of a map,
+//! and how many of them differ.
 //!
-//! `differing-pixels --flip FILE` flips the lowest bit of the pixel in the middle of one map.
+//! `differing-pixels --flip FILE` flips the lowest bit of the middle pixel of a map.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -1,8 +1,7 @@
-//! Raw pairs: what two cameras with lenses see that look a little past each other, where the two of a rendered scene stand.
+//! Raw pairs: images from two cameras with lens distortion and slightly different orientations, placed like those of a rendered scene.
 //!
-//! Each raw pixel is the mean of rays that go back through the lens, turn with the camera, and end in a view of the scene
-//! that is rendered at three times the size. Like `caster.rs`, pinholes need only + - * / and sqrt, so every machine makes
-//! the same bytes.
+//! Each raw pixel averages rays that are undistorted, rotated and traced into a view of the scene rendered at three times the size. As in
+//! `caster.rs`, pinhole cameras need only + - * / and sqrt, so that every machine makes the same bytes.
 
 #![allow(dead_code, unreachable_pub, reason = "each target that includes this module uses a part of it")]
 
@@ -10,28 +9,28 @@ use mrfgs::image::Plane;
 
 use super::scenes::Scene;
 
-/// A matrix of three rows.
+/// A 3 x 3 matrix, by rows.
 pub type Matrix = [[f64; 3]; 3];
 
-/// How a lens departs from a pinhole.
+/// Lens distortion models.
 #[derive(Clone, Copy, Debug)]
 pub enum Lens {
     /// k1, k2, p1, p2, k3.
     RadialTangential([f64; 5]),
-    /// k1 to k4 of a fisheye.
+    /// k1 to k4 of a fisheye lens.
     Equidistant([f64; 4]),
 }
 
-/// A camera at an eye of the scene.
+/// A camera at one of the viewpoints of the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     /// Focal length in pixels.
     pub focal: f64,
     /// Principal point.
     pub centre: [f64; 2],
-    /// What the lens does.
+    /// Lens distortion.
     pub lens: Lens,
-    /// From the frame of the scene to that of the camera.
+    /// Rotation from scene to camera coordinates.
     pub turn: Matrix,
 }
 
@@ -51,7 +50,7 @@ pub const CAMERAS: [Camera; 2] = [
     },
 ];
 
-/// A third camera: it sees more, from the right of the left one, from above and a little from behind.
+/// A third camera with a wider view, to the right of the left camera, above and a little behind it.
 pub const THIRD: Camera = Camera {
     focal: 260.0,
     centre: [203.0, 117.0],
@@ -59,15 +58,15 @@ pub const THIRD: Camera = Camera {
     turn: rotation([0.02, -0.03, 0.012]),
 };
 
-/// Where it stands, from the left one, and the size of its images.
+/// Position relative to the left camera, and image size.
 pub const THIRD_PLACE: [f64; 3] = [0.06, -0.045, -0.03];
 pub const THIRD_SIZE: (usize, usize) = (400, 240);
 
-/// The size of the pair in `testdata/raw`, and how many times larger the scene is rendered that it sees.
+/// Size of the pair in `testdata/raw`, and the factor by which the underlying scene is rendered larger.
 pub const SIZE: (usize, usize) = (240, 180);
 pub const SCALE: usize = 3;
 
-/// The rotation of the quaternion (1, v), made a unit: by about twice the length of `v`.
+/// Rotation of the normalized quaternion (1, v), by about twice the length of `v`.
 pub const fn rotation([x, y, z]: [f64; 3]) -> Matrix {
     let n = 1.0 + x * x + y * y + z * z;
     [
@@ -77,29 +76,27 @@ pub const fn rotation([x, y, z]: [f64; 3]) -> Matrix {
     ]
 }
 
-/// `a` times `b`.
 pub fn product(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|y| std::array::from_fn(|x| (0..3).map(|k| a[y][k] * b[k][x]).sum()))
 }
 
-/// The inverse of a rotation.
+/// Inverse of a rotation.
 pub fn inverse(m: &Matrix) -> Matrix {
     std::array::from_fn(|y| std::array::from_fn(|x| m[x][y]))
 }
 
-/// `m` times `v`.
 pub fn turned(m: &Matrix, v: [f64; 3]) -> [f64; 3] {
     m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
 impl Camera {
-    /// The ray through a point of the image, in the frame of the scene.
+    /// The ray through an image point, in scene coordinates.
     pub fn ray(&self, x: f64, y: f64) -> [f64; 3] {
         let [u, v] = [(x - self.centre[0]) / self.focal, (y - self.centre[1]) / self.focal];
         let [a, b] = match self.lens {
             Lens::RadialTangential([k1, k2, p1, p2, k3]) => {
                 let (mut a, mut b) = (u, v);
-                // It converges by a factor of three or more a step.
+                // Converges by a factor of at least three per step.
                 for _ in 0..40 {
                     let r2 = a * a + b * b;
                     let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
@@ -111,7 +108,7 @@ impl Camera {
             }
             Lens::Equidistant([k1, k2, k3, k4]) => {
                 let radius = (u * u + v * v).sqrt();
-                // By halves: the radius grows with the angle.
+                // Bisection: the radius grows with the angle.
                 let (mut low, mut high) = (0.0, 1.5);
                 for _ in 0..60 {
                     let angle: f64 = 0.5 * (low + high);
@@ -130,7 +127,7 @@ impl Camera {
         turned(&inverse(&self.turn), [a, b, 1.0])
     }
 
-    /// The pixel that shows a point in the frame of the camera.
+    /// Projects a point in camera coordinates to a pixel.
     pub fn project(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         let [a, b] = [x / z, y / z];
         let r2 = a * a + b * b;
@@ -153,7 +150,7 @@ impl Camera {
         [self.focal * u + self.centre[0], self.focal * v + self.centre[1]]
     }
 
-    /// What it sees of a view of the scene. Where that ends it is black.
+    /// Renders the raw image from a view of the scene; it is black outside the view.
     pub fn photograph(&self, (width, height): (usize, usize), view: &Plane<[u8; 3]>) -> Plane<[u8; 3]> {
         const RAYS: usize = 4;
         let part = |i: usize| (i as f64 + 0.5) / RAYS as f64 - 0.5;
@@ -181,36 +178,36 @@ impl Camera {
     }
 }
 
-/// Where a ray meets a view of the scene, which is one unit high at depth 1.
+/// Where a ray intersects a view of the scene, which is one unit high at depth 1.
 pub fn pixel((width, height): (usize, usize), [x, y, z]: [f64; 3]) -> [f64; 2] {
     let f = height as f64;
     [f * x / z + 0.5 * (width - 1) as f64, f * y / z + 0.5 * (height - 1) as f64]
 }
 
-/// How the second of two cameras stands to the first where their eyes are `baseline` apart: R and T.
+/// Pose of the second camera relative to the first, with the given baseline: R and T.
 pub fn pose([left, right]: &[Camera; 2], baseline: f64) -> (Matrix, [f64; 3]) {
     (product(&right.turn, &inverse(&left.turn)), turned(&right.turn, [-baseline, 0.0, 0.0]))
 }
 
-/// A matrix, as OpenCV writes it.
+/// A matrix in OpenCV's YAML.
 fn matrix(name: &str, rows: usize, numbers: &[f64]) -> String {
     let data: Vec<_> = numbers.iter().map(|v| format!("{v:?}")).collect();
     let (columns, data) = (numbers.len() / rows, data.join(", "));
     format!("{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {data} ]\n")
 }
 
-/// How the third camera, or another one in its place, stands to a left one that is turned by `from`.
+/// Pose of the third camera, or another in its place, relative to a left camera with rotation `from`.
 pub fn third_pose(third: &Camera, from: &Matrix) -> (Matrix, [f64; 3]) {
     (product(&third.turn, &inverse(from)), turned(&third.turn, THIRD_PLACE).map(|v| -v))
 }
 
-/// Where the third camera is in a scene.
+/// Position of the third camera in a scene.
 pub fn third_eye(scene: &Scene) -> [f64; 3] {
     let [x, y, z] = THIRD_PLACE;
     [x - 0.5 * baseline(scene), y, z]
 }
 
-/// A camera beside a pair, as OpenCV writes it, that stands like `pose` to the left one.
+/// A third camera in OpenCV's YAML, with `pose` relative to the left one.
 pub fn third(
     camera: &Camera,
     (width, height): (usize, usize),
@@ -228,7 +225,7 @@ pub fn third(
         + &matrix("T", 3, &translation)
 }
 
-/// The calibration of a raw pair, as OpenCV writes it.
+/// The calibration of a raw pair in OpenCV's YAML.
 pub fn calibration(cameras: &[Camera; 2], (width, height): (usize, usize), baseline: f64) -> String {
     let mut text = format!("%YAML:1.0\n---\nimageSize: [ {width}, {height} ]\nunit: m\n");
     for (n, camera) in (1..).zip(cameras) {
@@ -246,14 +243,14 @@ pub fn calibration(cameras: &[Camera; 2], (width, height): (usize, usize), basel
     text + &matrix("R", 3, rotation.as_flattened()) + &matrix("T", 3, &translation)
 }
 
-/// The distance of the eyes of a scene.
+/// The baseline of a scene.
 pub fn baseline(scene: &Scene) -> f64 {
     let text = scene.calibration();
     let line = text.lines().find_map(|line| line.strip_prefix("baseline="));
     line.and_then(|number| number.parse().ok()).expect("a calibration has a baseline")
 }
 
-/// The scene that `testdata/raw` shows, at [`SCALE`] times its size.
+/// The scene of `testdata/raw` at [`SCALE`] times its size.
 pub fn scene() -> Scene {
     super::scenes::render("slanted", SCALE * SIZE.0, SCALE * SIZE.1, 31 * SCALE as u32 + 1)
 }

@@ -1,19 +1,18 @@
-//! Renders a point cloud that `mrfgs match --also points` has written, seen from beside and above the camera that took it:
+//! Renders a point cloud from `mrfgs match --also points`, seen from beside and above the camera:
 //! `cargo run --release --example render-cloud FILE.ply PICTURE.png [RIGHT UP]`.
 //!
-//! RIGHT and UP say how far the viewer goes around the middle of the cloud, in degrees [default: 20 10]. Each point is a
-//! square as large as its pixel was, the nearest in front.
+//! RIGHT and UP are the angles by which the viewer orbits the middle of the cloud, in degrees [default: 20 10]. Each point is drawn as a
+//! square of the size of its pixel, nearest in front.
 
 use std::process::ExitCode;
 
 use image::{Rgb, RgbImage};
 
-/// Width of the picture in pixels.
 const WIDTH: u32 = 640;
 const HEIGHT: u32 = 480;
 const GROUND: Rgb<u8> = Rgb([24, 28, 34]);
 
-/// A point of the cloud: where it is, and its colour.
+/// Position and colour of a point of the cloud.
 type Point = ([f64; 3], Rgb<u8>);
 
 fn main() -> ExitCode {
@@ -42,7 +41,7 @@ fn angles(degrees: Vec<f64>) -> Option<[f64; 2]> {
     if degrees.is_empty() { Some([20.0, 10.0]) } else { degrees.try_into().ok() }
 }
 
-/// The points of a binary PLY file, by its header.
+/// Reads the points of a binary PLY file.
 fn read(bytes: &[u8]) -> Result<Vec<Point>, String> {
     const END: &[u8] = b"end_header\n";
     let start = bytes.windows(END.len()).position(|window| window == END).ok_or("no end of a PLY header")?;
@@ -71,7 +70,7 @@ fn read(bytes: &[u8]) -> Result<Vec<Point>, String> {
     if points.is_empty() { Err("holds no point".into()) } else { Ok(points) }
 }
 
-/// A point as the viewer sees it: place and size at depth 1, in units of the cloud.
+/// A point projected to the viewer: position and size at depth 1, in units of the cloud.
 struct Splat {
     place: [f64; 2],
     depth: f64,
@@ -79,17 +78,17 @@ struct Splat {
     colour: Rgb<u8>,
 }
 
-/// The points from `right` and `up` of the camera that took them (radians), looking at their middle.
+/// Renders the points from `right` and `up` of the camera that took them (radians), looking at their middle.
 fn render(points: &[Point], right: f64, up: f64) -> RgbImage {
     let middle = [0, 1, 2].map(|axis| quantile(points.iter().map(|(p, _)| p[axis]), 0.5));
-    // Around the vertical axis through the middle, then around the horizontal one; z becomes the distance along the view.
+    // Rotates around the vertical, then the horizontal axis through the middle; z becomes the distance along the viewing direction.
     let turned = |p: &[f64; 3]| {
         let [x, y, z] = [0, 1, 2].map(|axis| p[axis] - middle[axis]);
         let (x, z) = (x * right.cos() + z * right.sin(), z * right.cos() - x * right.sin());
         let (y, z) = (y * up.cos() - z * up.sin(), z * up.cos() + y * up.sin());
         [x, y, z + middle[2]]
     };
-    // How far apart neighbours were in the image, at depth 1; where they are in the new view, and how large there.
+    // Estimates the pixel spacing at depth 1, then projects each point with its size in the new view.
     let size = |axis: usize| {
         let places = || points.iter().map(|(p, _)| p[axis] / p[2]);
         quantile(places(), 1.0) - quantile(places(), 0.0)
@@ -102,7 +101,7 @@ fn render(points: &[Point], right: f64, up: f64) -> RgbImage {
     });
     let splats: Vec<Splat> = splats.collect();
 
-    // Nearly all of them fill the picture.
+    // The view contains nearly all of the points.
     let ends =
         |axis: usize| [0.005, 0.995].map(|share| quantile(splats.iter().map(|s| s.place[axis]), share));
     let [[left, far_right], [top, bottom]] = [ends(0), ends(1)];
@@ -129,7 +128,7 @@ fn render(points: &[Point], right: f64, up: f64) -> RgbImage {
     picture
 }
 
-/// The value below which this share of them lies.
+/// The quantile of the values at `share` (0 to 1).
 fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);

@@ -1,7 +1,7 @@
-//! Paints a depth map (PFM): `cargo run --release --example render-depth DEPTH.pfm PICTURE.png [BESIDE.png]`.
+//! Colours a depth map (PFM): `cargo run --release --example render-depth DEPTH.pfm PICTURE.png [BESIDE.png]`.
 //!
-//! Colours go by 1 / depth, as those of disparities do; what has no depth is black. With BESIDE, an image of the same view stands on
-//! the left.
+//! Colours follow 1 / depth, like those of disparity maps; pixels without a depth are black. BESIDE, an image of the same view, is placed
+//! on the left.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -1,10 +1,10 @@
-//! Re-creates everything that `testdata/` holds: `cargo run --release --example render-scenes [FOLDER]`.
+//! Regenerates the images of `testdata/`: `cargo run --release --example render-scenes [FOLDER]`.
 //!
-//! With a scene's name and a size it renders that scene alone, as large as one likes:
+//! With the name of a scene and a size, it renders only that scene at any size:
 //! `cargo run --release --example render-scenes FOLDER mixed 3000 2000 256`.
 //!
-//! With a number of frames it renders the sequence `passing` or `moving`, which `testdata/` does not hold, to the folders `left`,
-//! `right` and `truth`: `cargo run --release --example render-scenes FOLDER passing 640 480 64 30`.
+//! With a number of frames, it renders the sequence `passing` or `moving`, which are not in `testdata/`, to the folders `left`, `right` and
+//! `truth`: `cargo run --release --example render-scenes FOLDER passing 640 480 64 30`.
 
 #[path = "raw.rs"]
 mod raw;
@@ -85,7 +85,7 @@ fn save_sequence(folder: &Path, frames: impl Iterator<Item = scenes::Scene>) -> 
     Ok(())
 }
 
-/// Writes the raw pair, what a third camera sees, and their calibrations.
+/// Writes the raw pair, the image of the third camera, and the calibrations.
 fn save_raw(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder)?;
     let scene = raw::scene();
@@ -120,7 +120,7 @@ fn write_png(
     file.flush()
 }
 
-/// One channel, little-endian, bottom row first.
+/// Writes one channel, little-endian, bottom row first.
 fn write_pfm(path: &Path, plane: &Plane<f32>) -> Result<()> {
     let mut file = BufWriter::new(File::create(path)?);
     write!(file, "Pf\n{} {}\n-1.0\n", plane.width(), plane.height())?;

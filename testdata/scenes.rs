@@ -1,7 +1,6 @@
-//! The project's own stereo scenes, each a world of bodies that `caster.rs` renders.
+//! The project's own stereo scenes, as worlds for the ray caster in `caster.rs`.
 //!
-//! These files are no part of the library. Tests and the example `render-scenes` include this one by `#[path]`, and it
-//! the other.
+//! These files are not part of the library: tests and the example `render-scenes` include them by `#[path]`.
 
 #![allow(dead_code, unreachable_pub, reason = "each target that includes this module uses a part of it")]
 #![allow(clippy::unreadable_literal, reason = "colours are 0xRRGGBB")]
@@ -11,10 +10,10 @@ mod caster;
 use caster::{Pattern, Sensor, UP, VIEWER, Vec3, add, paint, scale, unit};
 pub use caster::{Scene, World};
 
-/// A scene and the size at which `testdata/` holds it.
+/// A scene and its size in `testdata/`.
 #[derive(Clone, Copy, Debug)]
 pub struct Recipe {
-    /// The scene's name.
+    /// Name of the scene.
     pub name: &'static str,
     /// Width in pixels.
     pub width: usize,
@@ -25,7 +24,7 @@ pub struct Recipe {
     world: fn() -> World,
 }
 
-/// Every scene, as `testdata/` holds it.
+/// All scenes, as in `testdata/`.
 pub const ALL: [Recipe; 16] = [
     Recipe::small("slanted", slanted),
     Recipe::small("thin", thin),
@@ -50,17 +49,16 @@ impl Recipe {
         Self { name, width: 240, height: 180, labels: 32, world }
     }
 
-    /// The scene, rendered anew.
+    /// Renders the scene.
     pub fn render(&self) -> Scene {
         (self.world)().shoot(self.name, self.width, self.height, self.labels)
     }
 }
 
-/// Scene `name` at any size and with any number of labels. The finer the pixels, the finer the textures.
+/// Renders scene `name` at any size and with any number of labels. Textures get finer with the pixels.
 ///
 /// # Panics
-/// When there is no scene of that name, when no pixel or no label is asked for, and when the image is more than three
-/// times as wide as high or its rows are fewer than half the labels: slanted walls would come too close at its sides.
+/// If there is no scene of that name, or as for [`World::shoot`].
 pub fn render(name: &str, width: usize, height: usize, labels: u32) -> Scene {
     Recipe { width, height, labels, ..*recipe(name) }.render()
 }
@@ -68,21 +66,21 @@ pub fn render(name: &str, width: usize, height: usize, labels: u32) -> Scene {
 /// The bodies of scene `name`.
 ///
 /// # Panics
-/// When there is no scene of that name.
+/// If there is no scene of that name.
 pub fn world(name: &str) -> World {
     (recipe(name).world)()
 }
 
 fn recipe(name: &str) -> &'static Recipe {
     let recipe = ALL.iter().find(|recipe| recipe.name == name);
-    recipe.unwrap_or_else(|| panic!("no scene is called {name:?}"))
+    recipe.unwrap_or_else(|| panic!("there is no scene {name:?}"))
 }
 
-/// The scene `slanted` while a ball and a card pass before it, `step` frames after the first. Where nothing moves, frames
-/// differ by the noise of the sensors alone.
+/// The scene `slanted` with a ball and a card passing in front, `step` frames after the first. Where nothing moves, frames differ only by
+/// sensor noise.
 ///
 /// # Panics
-/// As [`render`].
+/// As for [`render`].
 pub fn passing(step: u32, width: usize, height: usize, labels: u32) -> Scene {
     use Pattern::{Blotches, Checker};
     let mut world = World::new(11);
@@ -95,10 +93,10 @@ pub fn passing(step: u32, width: usize, height: usize, labels: u32) -> Scene {
     world.shoot("passing", width, height, labels)
 }
 
-/// The scene `slanted` from a rig that has moved to the right and forward, `step` frames after the first. Everything in the views moves.
+/// The scene `slanted` from a rig that has moved right and forward, `step` frames after the first, so that everything in the views moves.
 ///
 /// # Panics
-/// As [`render`].
+/// As for [`render`].
 pub fn moving(step: u32, width: usize, height: usize, labels: u32) -> Scene {
     let mut world = World::new(11);
     slants(&mut world);
@@ -108,14 +106,14 @@ pub fn moving(step: u32, width: usize, height: usize, labels: u32) -> Scene {
     world.shoot("moving", width, height, labels)
 }
 
-/// Planes at many slants, a ball and a tube: nothing is parallel to the image.
+/// Planes at many slants, a ball and a tube; nothing is parallel to the image.
 fn slanted() -> World {
     let mut world = World::new(11);
     slants(&mut world);
     world
 }
 
-/// The geometry that [`slanted`] and [`exposure`] share.
+/// The geometry of [`slanted`] and [`exposure`].
 fn slants(world: &mut World) {
     use Pattern::{Blotches, Checker, Plain, Rings};
     // Two walls that meet in a corner, and a floor.
@@ -138,7 +136,7 @@ fn slants(world: &mut World) {
         paint(Checker(0.115), [0x3f6b8c, 0xcbd3cf]),
     );
     world.disc([0.05, -0.52, 2.3], [-0.5, -0.4, -1.0], 0.32, paint(Blotches(0.2), [0x6c8f4e, 0xc8c98a]));
-    // Curved ones.
+    // Curved bodies.
     world.ball([0.02, 0.25, 1.85], 0.27, [0.4, -1.0, -0.3], paint(Blotches(0.22), [0xb74a3a, 0xe0a87c]));
     world.bar(
         [0.42, 0.43, 1.45],
@@ -148,7 +146,7 @@ fn slants(world: &mut World) {
     );
 }
 
-/// The slanted geometry under other paint grain, with a right camera that is darker and adds an offset.
+/// The geometry of [`slanted`] with another grain, and a right camera that is darker and adds an offset.
 fn exposure() -> World {
     let mut world = World::new(12);
     slants(&mut world);
@@ -158,7 +156,7 @@ fn exposure() -> World {
     world
 }
 
-/// Poles, leaning rods and a fence before a slanted background.
+/// Poles, leaning rods and a fence in front of a slanted background.
 fn thin() -> World {
     use Pattern::{Blotches, Plain, Rings};
     let mut world = World::new(13);
@@ -166,7 +164,7 @@ fn thin() -> World {
     world.plane([0.0, 0.62, 1.2], [0.0, -1.0, -0.16], paint(Plain, [0x8d7a63, 0]));
     let floor = |x: f64, z: f64| [x, 0.62 - 0.16 * (z - 1.2), z];
     let lift = |p: Vec3, height: f64| [p[0], p[1] - height, p[2]];
-    // A fence that recedes to the right: two rails and its pales.
+    // A fence that recedes to the right: two rails and their pales.
     let wood = paint(Plain, [0xd8cfbd, 0]).grain(0.12, 0.05);
     let along = |t: f64| floor(-0.95 + 1.5 * t, 1.5 + 0.7 * t);
     for height in [0.16, 0.4] {
@@ -190,7 +188,7 @@ fn thin() -> World {
     world
 }
 
-/// A large plain wall with faint shading behind a few textured things.
+/// A large plain wall with faint shading behind a few textured objects.
 fn wall() -> World {
     use Pattern::{Blotches, Checker, Plain, Wash};
     let mut world = World::new(14);
@@ -217,13 +215,13 @@ fn wall() -> World {
     world
 }
 
-/// Periodic stripes and squares whose only way out is their border and one thing in front.
+/// Periodic stripes and squares that are ambiguous except at their borders and at one object in front.
 fn repetitive() -> World {
     use Pattern::{Blotches, Checker, Plain, Stripes};
     let mut world = World::new(15);
     let faint = |pattern, colours| paint(pattern, colours).grain(0.012, 0.1);
     world.plane([0.0, 0.0, 2.8], VIEWER, paint(Blotches(0.4), [0x6f6459, 0xa39884]));
-    // A panel of stripes on the left, one of squares on the right, flush with each other.
+    // A panel of stripes on the left and one of squares on the right, in one plane.
     world.card([-0.62, -0.12, 2.4], VIEWER, UP, [0.6, 0.78], faint(Stripes(0.15), [0xd6cdb8, 0x465a72]));
     world.card([0.66, -0.12, 2.4], VIEWER, UP, [0.6, 0.78], faint(Checker(0.08), [0xcfc9bd, 0x7a3d35]));
     world.plane([0.0, 0.6, 1.2], [0.0, -1.0, -0.1], paint(Plain, [0x8a7255, 0]).stretch([0.3, 1.0, 1.0]));
@@ -231,8 +229,7 @@ fn repetitive() -> World {
     world
 }
 
-/// A wall with next to no texture behind a few textured things; towards their borders the two cameras lose light
-/// about different places.
+/// A nearly textureless wall behind a few textured objects; the vignetting of the two cameras has different centres.
 fn light() -> World {
     use Pattern::{Blotches, Checker, Plain, Rings};
     let mut world = World::new(17);
@@ -253,8 +250,8 @@ fn light() -> World {
     world
 }
 
-/// A floor seen at a grazing angle, a plain wall that runs past the viewer, and pillars at the left border, of which
-/// the right view has but a part.
+/// A floor at a grazing angle, a plain wall that runs past the viewer, and pillars at the left border, which the right view shows only in
+/// part.
 fn steep() -> World {
     use Pattern::{Blotches, Plain, Rings};
     let mut world = World::new(18);
@@ -265,7 +262,7 @@ fn steep() -> World {
     );
     let plaster = paint(Plain, [0xc9bfae, 0]).grain(0.006, 0.12);
     world.plane([0.0, 0.0, 5.0], [-1.6, 0.0, -1.0], plaster);
-    // Its disparity grows by 0.75 pixels a row, as far as the labels go.
+    // The disparity of the floor grows by 0.75 pixels per row, up to the largest label.
     world.plane([0.0, 0.507, 1.02], [0.0, -1.0, 0.284], paint(Plain, [0x94805f, 0]).grain(0.2, 0.12));
     world.bar(
         [-0.99, 0.72, 1.55],
@@ -284,7 +281,7 @@ fn steep() -> World {
     world
 }
 
-/// A white wall that runs past the viewer, and nothing on it but a poster at its far end.
+/// A white wall that runs past the viewer, blank except for a poster at its far end.
 fn poster() -> World {
     use Pattern::{Blotches, Checker, Plain};
     let mut world = World::new(19);
@@ -304,7 +301,7 @@ fn poster() -> World {
     world
 }
 
-/// A dark screen that mirrors a window behind the viewer, before a wall with something on it.
+/// A dark screen that reflects a window behind the viewer, in front of a wall with an object on it.
 fn screen() -> World {
     use Pattern::{Blotches, Plain, Rings};
     let mut world = World::new(20);
@@ -333,7 +330,7 @@ fn screen() -> World {
     world
 }
 
-/// A floor and a slanted wall that run out at the left border, where the right view has no part of them.
+/// A floor and a slanted wall that reach the left border, where the right view does not show them.
 fn border() -> World {
     use Pattern::{Blotches, Plain, Rings};
     let mut world = World::new(21);
@@ -349,7 +346,6 @@ fn border() -> World {
     world
 }
 
-/// A corridor of plain walls and a plain ceiling, with two doors and a carpet.
 fn corridor() -> World {
     use Pattern::{Blotches, Plain, Stripes};
     let mut world = World::new(22);
@@ -386,12 +382,12 @@ fn corridor() -> World {
     world
 }
 
-/// Pillars so near that each hides a wide part of what is behind it from the right view, where two surfaces meet.
+/// Nearby pillars that each occlude a wide region of the background, in which two surfaces meet.
 fn behind() -> World {
     use Pattern::{Blotches, Rings};
     let mut world = World::new(23);
     world.plane([0.0, 0.0, 4.2], [0.1, 0.0, -1.0], paint(Blotches(0.5), [0x8f8a9c, 0xb0a58d]));
-    // Screens at half the depth: the first ends beside its pillar, the second goes on behind it.
+    // Screens at half the depth: the first ends beside its pillar, the second continues behind it.
     let cloth = |a, b| paint(Blotches(0.18), [a, b]);
     world.card([-0.78, 0.0, 2.1], [0.15, 0.0, -1.0], UP, [0.36, 0.62], cloth(0x557a6a, 0xcfc48e));
     world.card([0.62, -0.1, 2.3], [-0.25, 0.0, -1.0], UP, [0.5, 0.5], cloth(0x8a4f46, 0xd3b79b));
@@ -402,7 +398,7 @@ fn behind() -> World {
     world
 }
 
-/// A still life with something of everything.
+/// A still life with a mixture of difficulties.
 fn mixed() -> World {
     use Pattern::{Blotches, Checker, Plain, Rings, Stripes, Wash};
     let mut world = World::new(16);
@@ -452,7 +448,7 @@ fn mixed() -> World {
         [0.0, -1.0, 0.4],
         paint(Blotches(0.14), [0xc24a36, 0xe38a58]),
     );
-    // A book that lies there, and a card that leans against the wall.
+    // A book lying on the table, and a card leaning against the wall.
     world.block(
         above(table(-0.12, 1.3), 0.025),
         [0.45, 0.14, -1.0],
@@ -467,7 +463,7 @@ fn mixed() -> World {
         [0.24, 0.33],
         paint(Checker(0.11), [0x5b4a74, 0xb9a5bd]),
     );
-    // A stick that stands alone.
+    // A single upright stick.
     world.bar(
         table(0.8, 1.5),
         above(table(0.76, 1.5), 0.9),
@@ -477,21 +473,21 @@ fn mixed() -> World {
     world
 }
 
-/// The still life, seen by a right camera that records it a part of a row lower.
+/// The still life with a right camera whose image is lower by a fraction of a row.
 fn rows() -> World {
     let mut world = mixed();
     world.sensors[1].lower = 0.6;
     world
 }
 
-/// The still life, seen by a right camera that is out of focus.
+/// The still life with a right camera out of focus.
 fn focus() -> World {
     let mut world = mixed();
     world.sensors[1].spread = 5.0;
     world
 }
 
-/// The still life in the dark: both sensors are noisy.
+/// The still life in the dark, with noise in both sensors.
 fn grain() -> World {
     let mut world = mixed();
     world.sensors.iter_mut().for_each(|sensor| sensor.noise = 12.0);

@@ -1,4 +1,4 @@
-// Builds the page into target/web/site: scripts/web calls this where the engine lies in target/web/engine.
+// Builds the page into target/web/site. Called by scripts/web after it has built the engine in target/web/engine.
 import { createHash } from 'node:crypto';
 import { copyFileSync, mkdirSync, readFileSync, readdirSync, renameSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { basename, dirname, join, relative } from 'node:path';
@@ -10,7 +10,7 @@ import { shrunk } from './png.mjs';
 const root = dirname(dirname(fileURLToPath(import.meta.url)));
 const engine = join(root, 'target/web/engine');
 const site = join(root, 'target/web/site');
-// Whole or not at all.
+// Replaces the site only when it is complete.
 const out = `${site}.new`;
 
 const SCENES = [
@@ -20,7 +20,7 @@ const SCENES = [
     { name: 'steep', title: 'Steep' },
 ];
 
-/** Eight characters that stand for the content, as esbuild has them in its names. */
+/** A content hash of eight characters, as in the file names of esbuild. */
 const digest = (content) => createHash('sha256').update(content).digest('hex').slice(0, 8).toUpperCase();
 
 rmSync(out, { recursive: true, force: true });
@@ -30,7 +30,7 @@ const wasm = readFileSync(join(engine, 'mrfgs_web_bg.wasm'));
 const wasmName = `engine-${digest(wasm)}.wasm`;
 writeFileSync(join(out, wasmName), wasm);
 
-/** Bundles; answers with the name that an entry has got. */
+/** Bundles the entries and returns a function from an entry to its output name. */
 async function bundle(entries, options) {
     const { metafile } = await build({
         entryPoints: entries.map((entry) => join(root, 'web/page', entry)),
@@ -61,7 +61,7 @@ const page = await bundle(['page.ts', 'style.css'], {
 });
 
 const names = { page: page('page.ts'), style: page('style.css') };
-/** Links to the source and the guide, once there is an address. */
+/** Links to the source and the guide, if the repository has an address. */
 const source = readFileSync(join(root, 'Cargo.toml'), 'utf8').match(/^repository = "(.*)"$/m)?.[1];
 names.links = source ? `    <a href="${source}">Source</a>\n    <a href="${source}/blob/main/docs/guide.md">Guide</a>\n` : '';
 const html = readFileSync(join(root, 'web/page/index.html'), 'utf8').replace(/\{\{(\w+)\}\}/g, (_, name) => names[name]);
@@ -69,7 +69,7 @@ writeFileSync(join(out, 'index.html'), html);
 copyFileSync(join(root, 'web/page/icon.svg'), join(out, 'icon.svg'));
 const licences = ['LICENSE-MIT', 'LICENSE-APACHE'].map((file) => readFileSync(join(root, file), 'utf8'));
 writeFileSync(join(out, 'licence.txt'), `mrfgs is under either of these licences, at your option.\n\n${licences.join('\n\n')}`);
-// Licences of what the files hold besides this project's own.
+// Third-party licences.
 copyFileSync(join(root, 'web/node_modules/three/LICENSE'), join(out, 'three-LICENSE.txt'));
 
 for (const { name } of SCENES) {
@@ -81,14 +81,14 @@ for (const { name } of SCENES) {
     writeFileSync(join(to, 'small.png'), shrunk(readFileSync(join(from, 'im0.png')), 96, 72));
 }
 
-/** All files below a folder, by their paths from it. */
+/** All files below a folder, as relative paths. */
 const files = (folder) =>
     readdirSync(folder, { recursive: true, withFileTypes: true })
         .filter((entry) => entry.isFile())
         .map((entry) => relative(folder, join(entry.parentPath ?? entry.path, entry.name)))
         .sort();
 
-// All but the views of the scenes, which are kept once they were opened, and that of the first view.
+// The views of the scenes, except the first one, are cached when they are opened.
 const later = (file) => /\/(im[01]\.png|calib\.txt)$/.test(file) && !file.startsWith(`scenes/${SCENES[0].name}/`);
 const kept = files(out).filter((file) => !later(file) && !/licen[cs]e/i.test(file));
 const all = createHash('sha256');

@@ -1,14 +1,14 @@
-// Pictures and maps in PNG files.
+// PNG pictures and maps.
 import { PNG } from 'pngjs';
 
-/** The levels of a grey file of 8 bits. */
+/** Decodes an 8-bit grey PNG. */
 export function levels(file) {
     const { width, height, data } = PNG.sync.read(file);
-    // Grey comes as RGBA.
+    // The decoder returns grey as RGBA.
     return { width, height, levels: Uint8Array.from({ length: width * height }, (_, i) => data[4 * i]) };
 }
 
-/** The file of a smaller picture, each of its pixels the mean of those that it covers. */
+/** A smaller picture as PNG; each pixel is the mean of those that it covers. */
 export function shrunk(file, width, height) {
     const large = PNG.sync.read(file);
     const small = new PNG({ width, height });
@@ -19,7 +19,7 @@ export function shrunk(file, width, height) {
             const sums = [0, 0, 0, 0];
             for (let j = Math.floor(top); j < bottom; j += 1) {
                 for (let i = Math.floor(left); i < right; i += 1) {
-                    // Pixels at the border count by the part that is covered.
+                    // Pixels at the border are weighted by the fraction covered.
                     const part = (Math.min(j + 1, bottom) - Math.max(j, top)) * (Math.min(i + 1, right) - Math.max(i, left));
                     sums.forEach((sum, c) => (sums[c] = sum + part * large.data[4 * (j * large.width + i) + c]));
                 }
@@ -28,6 +28,6 @@ export function shrunk(file, width, height) {
             sums.forEach((sum, c) => (small.data[4 * (y * width + x) + c] = Math.round(sum / area)));
         }
     }
-    // Photographs are smallest as differences to the neighbours (Paeth's filter).
+    // Paeth's filter compresses photographs best.
     return PNG.sync.write(small, { colorType: 2, filterType: 4 });
 }

@@ -1,4 +1,4 @@
-// What takes the place of cv::StereoSGBM in a program that uses OpenCV: views in, disparities out, as its compute() does.
+// Replaces cv::StereoSGBM in a program that uses OpenCV: views in, disparities out, like its compute().
 //
 //     c++ sgbm.cpp $(pkg-config --cflags --libs mrfgs opencv4) && ./a.out left.png right.png 64 disparity.png
 #include <mrfgs.h>
@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <iostream>
 
-// In place of cv::StereoSGBM::create(0, labels)->compute(left, right, disparity). Disparities are floats in pixels, +infinity where
-// there is none; SGBM's are 16-bit integers in 1/16 px.
+// Instead of cv::StereoSGBM::create(0, labels)->compute(left, right, disparity). Disparities are floats in pixels, +infinity where
+// missing; those of SGBM are 16-bit integers in 1/16 px.
 static void compute(mrfgs_matcher *matcher, const cv::Mat &left, const cv::Mat &right, int labels, cv::Mat &disparity) {
     const cv::Mat *views[] = {&left, &right};
     mrfgs_image images[2];
@@ -22,12 +22,12 @@ static void compute(mrfgs_matcher *matcher, const cv::Mat &left, const cv::Mat &
 
 int main(int argc, char **argv) {
     if (argc != 5) return 2;
-    mrfgs_matcher *matcher = nullptr;  // In place of the cv::Ptr<cv::StereoSGBM>: keep it from frame to frame.
+    mrfgs_matcher *matcher = nullptr;  // Instead of the cv::Ptr<cv::StereoSGBM>: keep it from frame to frame.
     if (mrfgs_matcher_new(nullptr, &matcher) != MRFGS_STATUS_OK) return std::cerr << mrfgs_last_error() << '\n', 1;
     const cv::Mat left = cv::imread(argv[1]), right = cv::imread(argv[2]);
     cv::Mat disparity, levels;
     compute(matcher, left, right, std::atoi(argv[3]), disparity);
-    disparity.convertTo(levels, CV_16U, 256);  // As KITTI stores them.
+    disparity.convertTo(levels, CV_16U, 256);  // The encoding of KITTI.
     mrfgs_matcher_free(matcher);
     return cv::imwrite(argv[4], levels) ? 0 : 1;
 }

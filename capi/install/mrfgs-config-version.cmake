@@ -1,4 +1,4 @@
-# Until 1.0, each minor version may break those before.
+# Before 1.0, minor versions may be incompatible.
 set(PACKAGE_VERSION "@VERSION@")
 if(PACKAGE_FIND_VERSION VERSION_EQUAL PACKAGE_VERSION)
     set(PACKAGE_VERSION_EXACT TRUE)

@@ -1,4 +1,4 @@
-# find_package(mrfgs) gives mrfgs::mrfgs, the shared library, and mrfgs::static.
+# find_package(mrfgs) defines mrfgs::mrfgs, the shared library, and mrfgs::static.
 get_filename_component(_mrfgs_prefix "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
 if(NOT TARGET mrfgs::mrfgs)
     add_library(mrfgs::mrfgs SHARED IMPORTED)

@@ -1,27 +1,27 @@
-//! What C gives: texts, things that were made before, and places for new ones.
+//! Arguments from C: texts, objects made earlier, and places for new ones.
 
 use std::ffi::{CStr, c_char};
 use std::ptr;
 
 use crate::status::{Failure, Status, call};
 
-/// The text of the argument `name`.
+/// Reads the text of the argument `name`.
 ///
 /// # Safety
-/// `text` is null or ends with a 0, and stays as it is for `'a`.
+/// `text` is null or ends with a 0, and does not change for `'a`.
 pub(crate) unsafe fn text<'a>(name: &str, text: *const c_char) -> Result<&'a str, Failure> {
     if text.is_null() {
         return Err(Failure::argument(format!("{name} is null")));
     }
-    // SAFETY: it is not null, and the caller promises the rest.
+    // SAFETY: it is not null, and the caller guarantees the rest.
     let text = unsafe { CStr::from_ptr(text) };
-    text.to_str().map_err(|_| Failure::argument(format!("{name} is no UTF-8")))
+    text.to_str().map_err(|_| Failure::argument(format!("{name} is not UTF-8")))
 }
 
-/// The texts of the argument `name`, an array of so many.
+/// Reads the texts of the argument `name`, an array of `count` texts.
 ///
 /// # Safety
-/// `texts` is null or holds so many pointers, each as `text` takes it.
+/// `texts` is null or holds `count` pointers, each valid for `text`.
 pub(crate) unsafe fn texts<'a>(
     name: &str,
     texts: *const *const c_char,
@@ -31,44 +31,44 @@ pub(crate) unsafe fn texts<'a>(
         return Err(Failure::argument(format!("{name}: the array is null")));
     }
     let each = (0..count).map(|i| {
-        // SAFETY: the caller promises that so many are there.
+        // SAFETY: the caller guarantees that the array has this many elements.
         let one = unsafe { texts.add(i) };
-        // SAFETY: the same.
+        // SAFETY: as above.
         let one = unsafe { one.read() };
-        // SAFETY: the caller promises it.
+        // SAFETY: guaranteed by the caller.
         unsafe { text(&format!("{name}[{i}]"), one) }
     });
     each.collect()
 }
 
-/// What the argument `name` points at.
+/// Dereferences the argument `name`.
 ///
 /// # Safety
-/// `thing` is null or good for `'a`.
+/// `thing` is null or valid for `'a`.
 pub(crate) unsafe fn thing<'a, T>(name: &str, thing: *const T) -> Result<&'a T, Failure> {
-    // SAFETY: the caller promises it.
+    // SAFETY: guaranteed by the caller.
     unsafe { thing.as_ref() }.ok_or_else(|| Failure::argument(format!("the {name} is null")))
 }
 
-/// Writes width and height to their places.
+/// Writes width and height to the given places.
 ///
 /// # Safety
-/// Each place is null, or a number can be written there.
+/// Each place is null or writable.
 pub(crate) unsafe fn put_size((width, height): (usize, usize), places: [*mut u32; 2]) -> Result<(), Failure> {
     for (place, count, name) in [(places[0], width, "width"), (places[1], height, "height")] {
         if place.is_null() {
             return Err(Failure::argument(format!("the place for the {name} is null")));
         }
-        // SAFETY: it is not null, and the caller promises the rest.
+        // SAFETY: it is not null, and the caller guarantees the rest.
         unsafe { place.write(count as u32) };
     }
     Ok(())
 }
 
-/// Puts what `make` makes in its place, and null where that fails.
+/// Stores the result of `make` in `place`, or null if that fails.
 ///
 /// # Safety
-/// `place` is null, or a pointer can be written there.
+/// `place` is null or writable.
 pub(crate) unsafe fn make<T>(
     name: &str,
     place: *mut *mut T,
@@ -78,7 +78,7 @@ pub(crate) unsafe fn make<T>(
         if place.is_null() {
             return Err(Failure::argument(format!("the place for the {name} is null")));
         }
-        // SAFETY: it is not null, and the caller promises the rest.
+        // SAFETY: it is not null, and the caller guarantees the rest.
         unsafe { place.write(ptr::null_mut()) };
         let made = Box::new(make()?);
         // SAFETY: as above.
@@ -87,14 +87,14 @@ pub(crate) unsafe fn make<T>(
     })
 }
 
-/// Frees what `make` has made; it may be null.
+/// Frees an object made by `make`; null is allowed.
 ///
 /// # Safety
-/// It is of `make`, and freed once.
+/// It comes from `make` and is freed once.
 pub(crate) unsafe fn free<T>(thing: *mut T) {
     if !thing.is_null() {
         call(|| {
-            // SAFETY: the caller promises it.
+            // SAFETY: guaranteed by the caller.
             drop(unsafe { Box::from_raw(thing) });
             Ok(())
         });

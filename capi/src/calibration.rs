@@ -1,4 +1,4 @@
-//! What is known of two cameras.
+//! Calibrations of two cameras.
 
 use std::ffi::c_char;
 use std::path::{Path, PathBuf};
@@ -9,11 +9,11 @@ use crate::argument;
 use crate::range::Region;
 use crate::status::{Failure, Status, call};
 
-/// What is known of a pair of cameras.
+/// The calibration of a pair of cameras.
 pub struct Calibration(pub(crate) StereoCalibration);
 
-/// Reads a calibration from one file, or from several that belong together (ROS has one for each camera), in any form that `mrfgs match`
-/// takes: the content tells it.
+/// Reads a calibration from one file, or from several that belong together (ROS has one per camera), in any format that `mrfgs match`
+/// reads; the format is recognised by content.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_calibration_read(
     paths: *const *const c_char,
@@ -21,16 +21,16 @@ pub unsafe extern "C" fn mrfgs_calibration_read(
     calibration: *mut *mut Calibration,
 ) -> Status {
     let read = || {
-        // SAFETY: the caller promises that so many texts are there.
+        // SAFETY: the caller guarantees an array of `count` texts.
         let paths = unsafe { argument::texts("paths", paths, count) }?;
         let paths: Vec<PathBuf> = paths.into_iter().map(PathBuf::from).collect();
         Ok(Calibration(calibration::read(&paths)?))
     };
-    // SAFETY: the caller promises that a pointer can be written there.
+    // SAFETY: the caller guarantees that `calibration` is null or writable.
     unsafe { argument::make("calibration", calibration, read) }
 }
 
-/// The same of the texts of such files. Errors call them "texts[0]" and so on.
+/// Reads a calibration from the texts of such files. Errors call them "texts[0]" and so on.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_calibration_of_texts(
     texts: *const *const c_char,
@@ -38,27 +38,27 @@ pub unsafe extern "C" fn mrfgs_calibration_of_texts(
     calibration: *mut *mut Calibration,
 ) -> Status {
     let read = || {
-        // SAFETY: the caller promises that so many texts are there.
+        // SAFETY: the caller guarantees an array of `count` texts.
         let texts = unsafe { argument::texts("texts", texts, count) }?;
         let names: Vec<String> = (0..count).map(|i| format!("texts[{i}]")).collect();
         let files: Vec<_> = names.iter().map(Path::new).zip(texts.into_iter().map(str::to_owned)).collect();
         Ok(Calibration(calibration::of_texts(&files)?))
     };
-    // SAFETY: the caller promises that a pointer can be written there.
+    // SAFETY: the caller guarantees that `calibration` is null or writable.
     unsafe { argument::make("calibration", calibration, read) }
 }
 
-/// States the unit of the baseline, where the files do not or wrongly: "mm", "cm" or "m".
+/// Sets the unit of the baseline, if the files lack it or have a wrong one: "mm", "cm" or "m".
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_calibration_unit(
     calibration: *mut Calibration,
     unit: *const c_char,
 ) -> Status {
     call(|| {
-        // SAFETY: the caller promises that it is null, or good and used by nobody else.
+        // SAFETY: the caller guarantees that it is null, or valid and not used elsewhere.
         let calibration = unsafe { calibration.as_mut() };
         let calibration = calibration.ok_or_else(|| Failure::argument("the calibration is null"))?;
-        // SAFETY: the caller promises that it is a text.
+        // SAFETY: the caller guarantees a text.
         let unit = unsafe { argument::text("the unit", unit) }?;
         let known = unit.parse();
         calibration.0.set_unit(
@@ -68,26 +68,26 @@ pub unsafe extern "C" fn mrfgs_calibration_unit(
     })
 }
 
-/// Makes it that of a part of the images, for images that show that part alone, as it is or scaled. Both cameras have the same part.
+/// Crops the calibration, for images that show only a part of the calibrated ones, possibly scaled. Both cameras get the same crop.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_calibration_crop(
     calibration: *mut Calibration,
     part: *const Region,
 ) -> Status {
     call(|| {
-        // SAFETY: the caller promises that it is null, or good and used by nobody else.
+        // SAFETY: the caller guarantees that it is null, or valid and not used elsewhere.
         let calibration = unsafe { calibration.as_mut() };
         let calibration = calibration.ok_or_else(|| Failure::argument("the calibration is null"))?;
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let part = unsafe { Region::part(part) }.ok_or_else(|| Failure::argument("the part is null"))?;
         calibration.0 = calibration.0.of_part(&part)?;
         Ok(())
     })
 }
 
-/// Frees a calibration; it may be null.
+/// Frees a calibration; null is allowed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_calibration_free(calibration: *mut Calibration) {
-    // SAFETY: the caller promises that it was made here, and is freed once.
+    // SAFETY: the caller guarantees that it was made here and is freed once.
     unsafe { argument::free(calibration) }
 }

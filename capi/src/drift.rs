@@ -1,4 +1,4 @@
-//! Rigs that drift, and how they are put right.
+//! Tracking of rigs whose right camera turns, and correction of their rectification.
 
 use std::ptr;
 use std::sync::MutexGuard;
@@ -12,7 +12,7 @@ use crate::range::Range;
 use crate::rectification::Rectification;
 use crate::status::{Failure, Status, call};
 
-/// What the frames of a rig show of how its right camera has turned since it was calibrated.
+/// Measures how the right camera of a rig has turned since its calibration.
 pub struct Drift {
     calibrated: mrfgs::rectification::Rectification,
     inner: Turns<drift::Drift>,
@@ -28,37 +28,37 @@ impl Drift {
 #[repr(C)]
 #[derive(Default)]
 pub struct Turn {
-    /// How far it looks up, to the right and clockwise, in degrees, from where it was calibrated.
+    /// The turn up, right and clockwise since the calibration, in degrees.
     pub degrees: [f64; 3],
-    /// The standard errors of these, in degrees, as if all frames showed one still scene.
+    /// Standard errors of the turn, in degrees, as if all frames showed one static scene.
     pub errors: [f64; 3],
-    /// How far that moves rows apart at most, in pixels.
+    /// The largest shift of rows that it causes, in pixels.
     pub rows: f64,
-    /// How many matches show it: 0 where the frames have too few, and all the rest is 0 then.
+    /// Number of matches that it is based on; 0 if the frames have too few, and then all other fields are 0.
     pub matches: u32,
-    /// 1 where it moves rows by 0.1 px or more and is no chance, else 0.
+    /// 1 if it shifts rows by at least 0.1 px and is significant, else 0.
     pub counts: u32,
 }
 
-/// The drift of a rig with this rectification, from which nothing has turned yet. The rectification may be freed before it.
+/// Starts tracking a rig with this rectification, before any turn. The rectification may be freed earlier.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_drift_new(
     rectification: *const Rectification,
     drift: *mut *mut Drift,
 ) -> Status {
     let make = || {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let calibrated = unsafe { argument::thing("rectification", rectification) }?.by.clone();
         let inner = Turns::new(drift::Drift::of(&calibrated)?);
         Ok(Drift { calibrated, inner })
     };
-    // SAFETY: the caller promises that a pointer can be written there.
+    // SAFETY: the caller guarantees that `drift` is null or writable.
     unsafe { argument::make("drift", drift, make) }
 }
 
-/// Takes the next frame, rectified by what mrfgs_drift_correct() gave last, and before that by the rectification of the calibration. It
-/// looks at the first, the fourth, the sixteenth, and then at every 64th, and of these the last 16 count. The masks are those of the views,
-/// as mrfgs_match_masked() takes them; each may be null. The range holds the disparities of the frame. Calls for one drift take turns.
+/// Takes the next frame, rectified by the last result of mrfgs_drift_correct(), or before that by the rectification of the calibration. It
+/// evaluates the first, fourth and sixteenth frame, then every 64th, and uses the last 16 of these. The masks belong to the views, as for
+/// mrfgs_match_masked(); each may be null. The range contains the disparities of the frame. Calls for one drift take turns.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_drift_follow(
     drift: *const Drift,
@@ -69,11 +69,11 @@ pub unsafe extern "C" fn mrfgs_drift_follow(
     range: *const Range,
 ) -> Status {
     call(|| {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let drift = unsafe { argument::thing("drift", drift) }?;
-        // SAFETY: the caller promises that the images are what their fields say until this returns.
+        // SAFETY: the caller guarantees that the images match their fields until this returns.
         let pair = unsafe { frame::pair([left, right], [left_mask, right_mask]) }?;
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let range = unsafe { Range::searched(range) }?;
         let range = range.ok_or_else(|| Failure::argument("the range is null"))?;
         drift.inner()?.follow(&pair, range)?;
@@ -81,11 +81,11 @@ pub unsafe extern "C" fn mrfgs_drift_follow(
     })
 }
 
-/// How the right camera has turned since the calibration, as far as the last frames show it.
+/// How the right camera has turned since the calibration, according to the last frames.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_drift_turn(drift: *const Drift, turn: *mut Turn) -> Status {
     call(|| {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let drift = unsafe { argument::thing("drift", drift) }?;
         if turn.is_null() {
             return Err(Failure::argument("the place for the turn is null"));
@@ -98,14 +98,14 @@ pub unsafe extern "C" fn mrfgs_drift_turn(drift: *const Drift, turn: *mut Turn) 
             matches: found.matches as u32,
             counts: found.counts().into(),
         });
-        // SAFETY: it is not null, and the caller promises the rest.
+        // SAFETY: it is not null, and the caller guarantees the rest.
         unsafe { turn.write(told.unwrap_or_default()) };
         Ok(())
     })
 }
 
-/// Makes the rectification of the next frames: that of the calibration, with the right camera turned. It is null where what rectified the
-/// last ones is still right. Free both, the one before when nothing uses it any more.
+/// Makes the rectification for the next frames: that of the calibration with the right camera turned, or null if the last one still holds.
+/// Free both, the previous one when nothing uses it any more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_drift_correct(
     drift: *const Drift,
@@ -115,9 +115,9 @@ pub unsafe extern "C" fn mrfgs_drift_correct(
         if rectification.is_null() {
             return Err(Failure::argument("the place for the rectification is null"));
         }
-        // SAFETY: it is not null, and the caller promises that a pointer can be written there.
+        // SAFETY: it is not null, and the caller guarantees that it is writable.
         unsafe { rectification.write(ptr::null_mut()) };
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let drift = unsafe { argument::thing("drift", drift) }?;
         let corrected = drift.inner()?.correct(&drift.calibrated)?;
         if let Some(by) = corrected {
@@ -129,9 +129,9 @@ pub unsafe extern "C" fn mrfgs_drift_correct(
     })
 }
 
-/// Frees a drift; it may be null.
+/// Frees a drift; null is allowed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_drift_free(drift: *mut Drift) {
-    // SAFETY: the caller promises that it was made here, and is freed once.
+    // SAFETY: the caller guarantees that it was made here and is freed once.
     unsafe { argument::free(drift) }
 }

@@ -1,4 +1,4 @@
-//! Frames in the memory of C.
+//! Frames in C's memory.
 
 use std::ffi::c_void;
 use std::slice;
@@ -9,9 +9,9 @@ use mrfgs::image::raster::{Raster, Samples};
 
 use crate::status::Failure;
 
-/// How the pixels of an image are stored. Samples of more than 8 bits are in the byte order of the machine. Those of 16 bits fill their
-/// range with the largest value of both images; floats run from the least to the largest value of both, and those that are not finite
-/// are ignored. A pixel whose alpha is 0 is ignored.
+/// How the pixels of an image are stored. Samples of more than 8 bits are in native byte order. 16 bits are scaled by the largest value of
+/// both images; floats are scaled from the smallest to the largest value of both, and non-finite ones are ignored. Pixels with alpha 0 are
+/// ignored.
 #[repr(u32)]
 #[derive(Clone, Copy, PartialEq)]
 pub enum Format {
@@ -39,7 +39,7 @@ pub enum Format {
     Bgra16 = 11,
 }
 
-/// What a sample is.
+/// The type of a sample.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Sample {
     Byte,
@@ -57,7 +57,7 @@ impl Sample {
     }
 }
 
-/// What pixels are made of.
+/// The layout of a pixel.
 #[derive(Clone, Copy)]
 pub(crate) struct Layout {
     pub(crate) sample: Sample,
@@ -81,7 +81,7 @@ const LAYOUTS: [(Format, Sample, usize, bool); 11] = [
 ];
 
 impl Layout {
-    /// That of an mrfgs_format.
+    /// The layout of an mrfgs_format.
     pub(crate) fn of(format: u32, name: &str) -> Result<Self, Failure> {
         match LAYOUTS.iter().find(|(known, ..)| *known as u32 == format) {
             Some(&(_, sample, channels, is_bgr)) => Ok(Self { sample, channels, is_bgr }),
@@ -102,7 +102,7 @@ impl Layout {
 pub struct Image {
     /// The first pixel of the first row.
     pub data: *const c_void,
-    /// Bytes from a row to the next one; any number that a row fits into.
+    /// Bytes from one row to the next, at least the bytes of a row.
     pub stride: usize,
     /// Pixels of a row.
     pub width: u32,
@@ -113,10 +113,10 @@ pub struct Image {
 }
 
 impl Image {
-    /// The bytes of all rows, and those of one.
+    /// The bytes of all rows, and the number of bytes of one row.
     ///
     /// # Safety
-    /// `data` is null, or holds rows as the fields say, which nobody changes for `'a`.
+    /// `data` is null, or contains rows as the fields say, unchanged for `'a`.
     unsafe fn rows<'a>(&self, name: &str, pixel: usize) -> Result<(&'a [u8], usize), Failure> {
         let (width, height) = (self.width as usize, self.height as usize);
         let (row, length) = extent(self.stride, (width, height), pixel)
@@ -124,18 +124,18 @@ impl Image {
         if self.data.is_null() {
             return Err(Failure::argument(format!("the {name} has no data: its pointer is null")));
         }
-        // SAFETY: it is not null, and the caller promises that the rows are there; their bytes fit into an `isize`.
+        // SAFETY: it is not null, the caller guarantees that the rows exist, and their size fits into an `isize`.
         Ok((unsafe { slice::from_raw_parts::<'a>(self.data.cast::<u8>(), length) }, row))
     }
 
-    /// The image, borrowed where its bytes are those of an image of the library.
+    /// The image, borrowed if its bytes have the library's layout.
     ///
     /// # Safety
     /// As for `rows`.
     unsafe fn raster<'a>(&self, name: &str) -> Result<Raster<'a>, Failure> {
         let layout = Layout::of(self.format, name)?;
         let size = (self.width as usize, self.height as usize);
-        // SAFETY: the caller promises it.
+        // SAFETY: guaranteed by the caller.
         let (data, row) = unsafe { self.rows(name, layout.pixel_bytes()) }?;
         if layout.sample == Sample::Byte && !layout.is_bgr {
             return Ok(Raster::borrowed(data, size, layout.channels, self.stride)?);
@@ -150,7 +150,7 @@ impl Image {
         Ok(Raster::new(size.0, size.1, layout.channels, samples)?)
     }
 
-    /// A mask: where its samples are not 0.
+    /// A mask, set where samples are not 0.
     ///
     /// # Safety
     /// As for `rows`.
@@ -161,14 +161,14 @@ impl Image {
                 self.format
             )));
         }
-        // SAFETY: the caller promises it.
+        // SAFETY: guaranteed by the caller.
         let (data, row) = unsafe { self.rows(name, 1) }?;
         let masked = data.chunks(self.stride).flat_map(|line| line[..row].iter().map(|v| *v != 0));
         Ok(Plane::new(self.width as usize, self.height as usize, masked.collect()))
     }
 }
 
-/// The samples of rows, which may begin at odd addresses, with red before blue.
+/// The samples of rows, which may be unaligned, in RGB order.
 fn copied<'a, T, const BYTES: usize>(
     lines: impl Iterator<Item = &'a [u8]>,
     count: usize,
@@ -177,7 +177,7 @@ fn copied<'a, T, const BYTES: usize>(
     value: fn([u8; BYTES]) -> T,
 ) -> Result<Vec<T>, Failure> {
     let mut samples = Vec::new();
-    let lacking = |_| Failure::memory(format!("a copy of the {name} cannot be had: give a smaller one"));
+    let lacking = |_| Failure::memory(format!("cannot allocate a copy of the {name}: give a smaller one"));
     samples.try_reserve_exact(count).map_err(lacking)?;
     for line in lines {
         samples.extend(line.as_chunks().0.iter().map(|bytes| value(*bytes)));
@@ -188,12 +188,12 @@ fn copied<'a, T, const BYTES: usize>(
     Ok(samples)
 }
 
-/// The pair of two images, less what their masks say; masks may be null.
+/// The pair of two images, without masked pixels; masks may be null.
 ///
 /// # Safety
-/// The images and masks are null or good, and nobody changes their data until this returns.
+/// The images and masks are null or valid, and their data does not change until this returns.
 pub(crate) unsafe fn pair(images: [*const Image; 2], masks: [*const Image; 2]) -> Result<Pair, Failure> {
-    // SAFETY: the caller promises it.
+    // SAFETY: guaranteed by the caller.
     let [left, right] = unsafe { rasters(images, masks) }?;
     Ok(Pair::of_frames(left, right)?)
 }
@@ -201,15 +201,15 @@ pub(crate) unsafe fn pair(images: [*const Image; 2], masks: [*const Image; 2]) -
 /// The pair of two raw images, which may differ in size.
 ///
 /// # Safety
-/// The pointers of both frames must be null or good, as for [`pair`].
+/// As for [`pair`].
 pub(crate) unsafe fn raw_pair(images: [*const Image; 2]) -> Result<Pair, Failure> {
-    // SAFETY: the caller promises it.
+    // SAFETY: guaranteed by the caller.
     let [left, right] = unsafe { rasters(images, [std::ptr::null(); 2]) }?;
     Ok(Pair::of_raw_frames(left, right)?)
 }
 
 /// # Safety
-/// The pointers of both frames must be null or good, as for [`pair`].
+/// As for [`pair`].
 unsafe fn rasters<'a>(
     images: [*const Image; 2],
     masks: [*const Image; 2],
@@ -218,35 +218,35 @@ unsafe fn rasters<'a>(
         [["left image", "mask of the left image"], ["right image", "mask of the right image"]];
     let view = |i: usize| {
         let [name, mask_name] = NAMES[i];
-        // SAFETY: the caller promises it.
+        // SAFETY: guaranteed by the caller.
         let image = unsafe { images[i].as_ref() };
         let image = image.ok_or_else(|| Failure::argument(format!("the {name} is null")))?;
-        // SAFETY: the same.
+        // SAFETY: as above.
         let raster = unsafe { image.raster(name) }?;
-        // SAFETY: the same.
+        // SAFETY: as above.
         let Some(mask) = (unsafe { masks[i].as_ref() }) else { return Ok(raster) };
-        // SAFETY: the same.
+        // SAFETY: as above.
         let mask = unsafe { mask.mask(mask_name) }?;
         raster.masked_by(mask).map_err(|error| Failure::argument(format!("the {mask_name}: {error}")))
     };
     Ok([view(0)?, view(1)?])
 }
 
-/// Bytes of a row, and from the first byte of the first row to the last one of the last row.
+/// The bytes of a row, and the bytes from the start of the first row to the end of the last row.
 ///
 /// # Errors
-/// What is wrong with the stride or the size.
+/// The fault of the stride or the size.
 pub(crate) fn extent(
     stride: usize,
     (width, height): (usize, usize),
     pixel: usize,
 ) -> Result<(usize, usize), String> {
     if width == 0 || height == 0 {
-        return Err("holds no pixel".into());
+        return Err("has no pixels".into());
     }
     let row = width.checked_mul(pixel).filter(|row| *row <= stride);
-    let row = row.ok_or_else(|| format!("has a stride of {stride} bytes, and a row takes more"))?;
+    let row = row.ok_or_else(|| format!("has a stride of {stride} bytes, less than a row needs"))?;
     let length = stride.checked_mul(height - 1).and_then(|before| before.checked_add(row));
     let length = length.filter(|length| isize::try_from(*length).is_ok());
-    Ok((row, length.ok_or_else(|| format!("has a stride of {stride} bytes, and no memory holds its rows"))?))
+    Ok((row, length.ok_or_else(|| format!("has a stride of {stride} bytes, too large for memory"))?))
 }

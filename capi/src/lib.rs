@@ -1,6 +1,6 @@
-//! The library for C and C++: frames in, the matcher of the crate `mrfgs`, maps out. `include/mrfgs.h` is made from this.
+//! The library for C and C++. `include/mrfgs.h` is generated from this crate.
 
-// Pointers of C are dereferenced here and nowhere else in mrfgs.
+// Only this crate dereferences pointers of C.
 #![allow(unsafe_code, reason = "every pointer comes from C")]
 #![deny(clippy::undocumented_unsafe_blocks, clippy::multiple_unsafe_ops_per_block)]
 #![allow(unreachable_pub, reason = "what is in the header is pub")]

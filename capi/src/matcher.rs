@@ -18,10 +18,10 @@ use crate::text::Said;
 use crate::warnings;
 use crate::words;
 
-/// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
+/// Matches pairs, keeping the device, its compiled shaders and its buffers in between.
 pub struct Matcher {
     inner: SharedMatcher,
-    /// Its method, and the same with the map of the right view.
+    /// The method, without and with the map of the right view.
     methods: [Method; 2],
     stop: AtomicBool,
 }
@@ -31,11 +31,11 @@ thread_local! {
     static NOTE: Said = const { Said::nothing() };
 }
 
-/// Opens the device, and makes *matcher; options may be null, and are not needed afterwards. Where it fails, *matcher is null.
+/// Opens the device, and makes *matcher; options may be null, and may be freed afterwards. On failure *matcher is null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_matcher_new(options: *const Options, matcher: *mut *mut Matcher) -> Status {
     let open = || {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let options = unsafe { options.as_ref() };
         let (method, execution) = options
             .map_or_else(Default::default, |options| (options.method.clone(), options.execution.clone()));
@@ -45,28 +45,28 @@ pub unsafe extern "C" fn mrfgs_matcher_new(options: *const Options, matcher: *mu
         let methods = [method, with_right];
         Ok(Matcher { inner, methods, stop: AtomicBool::new(false) })
     };
-    // SAFETY: the caller promises that a pointer can be written there.
+    // SAFETY: the caller guarantees that `matcher` is null or writable.
     unsafe { argument::make("matcher", matcher, open) }
 }
 
-/// Frees a matcher, when no match of it runs any more; it may be null.
+/// Frees a matcher, once no match of it is running; null is allowed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_matcher_free(matcher: *mut Matcher) {
-    // SAFETY: the caller promises that it is of `mrfgs_matcher_new`, and freed once.
+    // SAFETY: the caller guarantees that it is from `mrfgs_matcher_new` and is freed once.
     unsafe { argument::free(matcher) }
 }
 
-/// Ends the match that runs, from another thread, or else the next one: it returns MRFGS_STATUS_STOPPED.
+/// Stops the running match, or else the next one, which returns MRFGS_STATUS_STOPPED. Call it from another thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_matcher_stop(matcher: *const Matcher) -> Status {
     call(|| {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         unsafe { argument::thing("matcher", matcher) }?.stop.store(true, Ordering::Relaxed);
         Ok(())
     })
 }
 
-/// Matches a rectified pair of images of one size, and writes maps. Without a range (null), sparse matches find it.
+/// Matches a rectified pair of images of the same size, and writes maps. Without a range (null) it is estimated from sparse matches.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_match(
     matcher: *const Matcher,
@@ -75,12 +75,11 @@ pub unsafe extern "C" fn mrfgs_match(
     range: *const Range,
     maps: *const Maps,
 ) -> Status {
-    // SAFETY: the caller promises what is needed.
+    // SAFETY: the caller guarantees all requirements.
     unsafe { mrfgs_match_masked(matcher, left, right, ptr::null(), ptr::null(), range, maps) }
 }
 
-/// The same with masks, MRFGS_FORMAT_GREY8 and of the size of the images: where one is not 0, the pixel of its image is ignored. Each
-/// may be null.
+/// Like mrfgs_match() with masks of MRFGS_FORMAT_GREY8 and the size of the images, whose nonzero pixels are ignored. Each may be null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_match_masked(
     matcher: *const Matcher,
@@ -91,13 +90,14 @@ pub unsafe extern "C" fn mrfgs_match_masked(
     range: *const Range,
     maps: *const Maps,
 ) -> Status {
-    // SAFETY: the caller promises what is needed.
+    // SAFETY: the caller guarantees all requirements.
     unsafe { mrfgs_match_region(matcher, left, right, left_mask, right_mask, range, ptr::null(), maps) }
 }
 
-/// The same of a region of the left image alone, in the time of that part; null takes all. The maps have the size of the region.
+/// Like mrfgs_match_masked() for a region of the left image, in proportionally less time; null means all. The maps have the size of the
+/// region.
 #[unsafe(no_mangle)]
-#[allow(clippy::too_many_arguments, reason = "C has no other way to leave some out")]
+#[allow(clippy::too_many_arguments, reason = "C has no default arguments")]
 pub unsafe extern "C" fn mrfgs_match_region(
     matcher: *const Matcher,
     left: *const Image,
@@ -109,15 +109,15 @@ pub unsafe extern "C" fn mrfgs_match_region(
     maps: *const Maps,
 ) -> Status {
     call(|| {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let matcher = unsafe { argument::thing("matcher", matcher) }?;
-        // SAFETY: the caller promises that the images are what their fields say until this returns.
+        // SAFETY: the caller guarantees that the images match their fields until this returns.
         let pair = unsafe { frame::pair([left, right], [left_mask, right_mask]) }?;
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let range = unsafe { Range::searched(range) }?;
-        // SAFETY: the same.
+        // SAFETY: as above.
         let part = unsafe { Region::part(region) };
-        // SAFETY: the same.
+        // SAFETY: as above.
         let maps = unsafe { Maps::given(maps) }?;
         maps.check(part.as_ref().map_or(pair.size(), Rect::size))?;
         let method = &matcher.methods[usize::from(!maps.right.is_null())];
@@ -131,11 +131,11 @@ pub unsafe extern "C" fn mrfgs_match_region(
                 None => job,
             };
             let matched = job.method(method).cancel(&matcher.stop).run();
-            // Before the turn ends: the next match is not meant any more.
+            // Reset before the turn ends, so that the next match is not stopped.
             matcher.stop.store(false, Ordering::Relaxed);
             matched
         })?;
-        // SAFETY: they were checked for this size, and the caller promises that they are as large as their fields say.
+        // SAFETY: they were checked for this size, and the caller guarantees that they are as large as their fields say.
         unsafe { maps.write(&matched) };
         warnings::say(matched.warnings().iter().map(words::warning));
         DEVICE.with(|device| device.say(&matched.ran_on));
@@ -144,13 +144,13 @@ pub unsafe extern "C" fn mrfgs_match_region(
     })
 }
 
-/// What ran the last match of this thread that succeeded, for people; "" before the first. It stays until the next one.
+/// The device of this thread's last successful match, for display; "" before the first. Valid until the next one.
 #[unsafe(no_mangle)]
 pub extern "C" fn mrfgs_last_device() -> *const c_char {
     DEVICE.with(Said::text)
 }
 
-/// Why that is not the device that was hoped for; "" where it is.
+/// Why that is not the preferred device; "" if it is.
 #[unsafe(no_mangle)]
 pub extern "C" fn mrfgs_last_note() -> *const c_char {
     NOTE.with(Said::text)

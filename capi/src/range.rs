@@ -1,11 +1,11 @@
-//! The disparities to search, and where.
+//! The disparity range and the region.
 
 use mrfgs::image::Rect;
 use mrfgs::options::DisparityRange;
 
 use crate::status::Failure;
 
-/// The disparities to search, in pixels, both ends included.
+/// The disparities to search, in pixels, inclusive.
 #[repr(C)]
 pub struct Range {
     pub min: i32,
@@ -13,18 +13,18 @@ pub struct Range {
 }
 
 impl Range {
-    /// The range; `None` where it is null.
+    /// The range; `None` if it is null.
     ///
     /// # Safety
-    /// `range` is null or good.
+    /// `range` is null or valid.
     pub(crate) unsafe fn searched(range: *const Self) -> Result<Option<DisparityRange>, Failure> {
-        // SAFETY: the caller promises it.
+        // SAFETY: guaranteed by the caller.
         let range = unsafe { range.as_ref() };
         Ok(range.map(|range| DisparityRange::new(range.min, range.max)).transpose()?)
     }
 }
 
-/// A part of the left image, in pixels: its first column and row, and its size.
+/// A region of the left image, in pixels: first column, first row and size.
 #[repr(C)]
 pub struct Region {
     pub x: u32,
@@ -34,12 +34,12 @@ pub struct Region {
 }
 
 impl Region {
-    /// Its columns and rows; `None` where it is null.
+    /// The region as columns and rows; `None` if it is null.
     ///
     /// # Safety
-    /// `region` is null or good.
+    /// `region` is null or valid.
     pub(crate) unsafe fn part(region: *const Self) -> Option<Rect> {
-        // SAFETY: the caller promises it.
+        // SAFETY: guaranteed by the caller.
         let region = unsafe { region.as_ref() };
         let ends = |start: u32, length: u32| start as usize..(start as usize).saturating_add(length as usize);
         region.map(|region| Rect { x: ends(region.x, region.width), y: ends(region.y, region.height) })

@@ -1,4 +1,4 @@
-//! Rectified pairs of what two cameras saw.
+//! Rectification of raw pairs.
 
 use std::ffi::c_void;
 use std::sync::OnceLock;
@@ -14,33 +14,32 @@ use crate::status::{Failure, Status, call};
 use crate::warnings;
 use crate::words;
 
-/// How images as the cameras took them become a rectified pair. It is found once, and applied to any number of pairs.
+/// Turns raw images into rectified pairs. It is computed once and applies to any number of pairs.
 pub struct Rectification {
     pub(crate) by: mrfgs::rectification::Rectification,
-    /// The same with its places, from the first pair on.
+    /// A copy with cached source positions, from the first pair on.
     kept: OnceLock<mrfgs::rectification::Rectification>,
 }
 
-/// Where a rectified view is written; it has the size of mrfgs_rectification_size(). Strides are in bytes, from a row to the next one.
+/// The destination of a rectified view, of the size mrfgs_rectification_size(). Strides are in bytes, from one row to the next.
 #[repr(C)]
 pub struct View {
     /// sizeof(mrfgs_view).
     pub size: usize,
-    /// The pixels; 0 where there is no source. Null leaves them out.
+    /// The pixels; 0 without a source. Null skips them.
     pub data: *mut c_void,
     pub stride: usize,
-    /// The mrfgs_format of the pixels, of 8 or 16 bits. Of views of more than 8 bits, 8 bits are the upper ones; alpha is 0 where there is
-    /// no source.
+    /// The mrfgs_format of the pixels, of 8 or 16 bits. 8 bits are the upper bits of deeper views; alpha is 0 without a source.
     pub format: u32,
-    /// 255 where there is no source, else 0: a mask for mrfgs_match_masked(). Null leaves it out.
+    /// 255 for pixels without a source, else 0: a mask for mrfgs_match_masked(). Null skips it.
     pub mask: *mut u8,
     pub mask_stride: usize,
 }
 
-/// The rectification of images of so many pixels (0 and 0: those of the calibration), as OpenCV's stereoRectify chooses it. Alpha is from
-/// 0, where every pixel of the views has a source, to 1, where no pixel of the images is lost; below 0 it is the rectification of the
-/// calibration where it has one, else one that keeps the focal length. zero_disparity is 1 where what is infinitely far is to have a
-/// disparity of 0, else 0. mrfgs_last_warnings() says what is probably wrong with the calibration.
+/// Makes the rectification of images of this size in pixels (0 and 0: that of the calibration), like OpenCV's stereoRectify. Alpha runs
+/// from 0, where the views have no empty borders, to 1, where they contain all pixels of the images; below 0 the rectification in the
+/// calibration is used if there is one, else one that keeps the focal length. With zero_disparity 1, points at infinity have disparity 0.
+/// mrfgs_last_warnings() lists probable faults of the calibration.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_rectification_new(
     calibration: *const Calibration,
@@ -51,19 +50,17 @@ pub unsafe extern "C" fn mrfgs_rectification_new(
     rectification: *mut *mut Rectification,
 ) -> Status {
     let find = || {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let calibration = unsafe { argument::thing("calibration", calibration) }?;
         let sizes = match (width, height) {
             (0, 0) => calibration.0.sizes().ok_or_else(|| {
-                Failure::argument(
-                    "the calibration does not say the size of the images: give width and height",
-                )
+                Failure::argument("the calibration lacks the size of the images: give width and height")
             })?,
             size => [(size.0 as usize, size.1 as usize); 2],
         };
         if alpha.is_nan() || alpha > 1.0 {
             return Err(Failure::argument(format!(
-                "alpha is {alpha}: give a number from 0 to 1, or -1 for the rectification of the calibration"
+                "alpha is {alpha}: give a number from 0 to 1, or -1 for the rectification in the calibration"
             )));
         }
         let options =
@@ -72,11 +69,11 @@ pub unsafe extern "C" fn mrfgs_rectification_new(
         warnings::say(by.doubts().iter().map(words::doubt));
         Ok(Rectification::of(by))
     };
-    // SAFETY: the caller promises that a pointer can be written there.
+    // SAFETY: the caller guarantees that `rectification` is null or writable.
     unsafe { argument::make("rectification", rectification, find) }
 }
 
-/// Width and height of the rectified views, in pixels; turned by a quarter where one camera is above the other.
+/// Width and height of the rectified views, in pixels; swapped if one camera is above the other.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_rectification_size(
     rectification: *const Rectification,
@@ -84,9 +81,9 @@ pub unsafe extern "C" fn mrfgs_rectification_size(
     height: *mut u32,
 ) -> Status {
     call(|| {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let rectification = unsafe { argument::thing("rectification", rectification) }?;
-        // SAFETY: the caller promises that a number can be written to each place that is not null.
+        // SAFETY: the caller guarantees that each place is null or writable.
         unsafe { argument::put_size(rectification.by.size(), [width, height]) }
     })
 }
@@ -101,29 +98,29 @@ pub unsafe extern "C" fn mrfgs_rectify(
     right_view: *const View,
 ) -> Status {
     call(|| {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let rectification = unsafe { argument::thing("rectification", rectification) }?;
-        // SAFETY: the caller promises that the images are what their fields say until this returns.
+        // SAFETY: the caller guarantees that the images match their fields until this returns.
         let pair = unsafe { frame::raw_pair([left, right]) }?;
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let left = unsafe { argument::thing("left view", left_view) }?;
-        // SAFETY: the same.
+        // SAFETY: as above.
         let right = unsafe { argument::thing("right view", right_view) }?;
         let size = rectification.by.size();
         let layouts = [left.check("left view", size)?, right.check("right view", size)?];
         let pair = rectification.with_places()?.apply(&pair)?;
-        // SAFETY: it was checked for this size, and the caller promises that it is as large as its fields say.
+        // SAFETY: it was checked for this size, and the caller guarantees that it is as large as its fields say.
         unsafe { left.write(layouts[0], pair.left()) };
-        // SAFETY: the same.
+        // SAFETY: as above.
         unsafe { right.write(layouts[1], pair.right()) };
         Ok(())
     })
 }
 
-/// Frees a rectification; it may be null.
+/// Frees a rectification; null is allowed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_rectification_free(rectification: *mut Rectification) {
-    // SAFETY: the caller promises that it was made here, and is freed once.
+    // SAFETY: the caller guarantees that it was made here and is freed once.
     unsafe { argument::free(rectification) }
 }
 
@@ -132,7 +129,7 @@ impl Rectification {
         Self { by, kept: OnceLock::new() }
     }
 
-    /// Many pairs may follow the first, so it finds out once where pixels come from.
+    /// Caches the source positions, as many pairs may follow the first.
     fn with_places(&self) -> mrfgs::Result<&mrfgs::rectification::Rectification> {
         if let Some(kept) = self.kept.get() {
             return Ok(kept);
@@ -144,19 +141,19 @@ impl Rectification {
 }
 
 impl View {
-    /// What its pixels are made of, where a view of this size fits.
+    /// The layout of its pixels, after checking that a view of this size fits.
     fn check(&self, name: &str, size: (usize, usize)) -> Result<Layout, Failure> {
         let wrong = |what: &str| Failure::argument(format!("the {name} {what}"));
         if self.size != size_of::<Self>() {
             return Err(wrong(&format!(
-                "has the size {}, and sizeof(mrfgs_view) is {} in the library: set it, and build with the library's own header",
+                "has the size {}, but sizeof(mrfgs_view) is {} in the library: set it, and build with the library's own header",
                 self.size,
                 size_of::<Self>()
             )));
         }
         let layout = Layout::of(self.format, name)?;
         if layout.sample == Sample::Float {
-            return Err(wrong("has a format of floats: give one of 8 or 16 bits"));
+            return Err(wrong("has a float format: give one of 8 or 16 bits"));
         }
         if !self.data.is_null() {
             extent(self.stride, size, layout.pixel_bytes()).map_err(|what| wrong(&what))?;
@@ -167,14 +164,14 @@ impl View {
         Ok(layout)
     }
 
-    /// Writes pixels and mask where they are wanted.
+    /// Writes the requested pixels and mask.
     ///
     /// # Safety
     /// The view was checked for the size of `image`, and is as large as its fields say.
     unsafe fn write(&self, layout: Layout, image: &image::Image) {
         if !self.mask.is_null() {
             let mask = image.masked.map(|masked| if *masked { u8::MAX } else { 0 });
-            // SAFETY: the caller promises it.
+            // SAFETY: guaranteed by the caller.
             unsafe { put(&mask, self.mask, self.mask_stride) };
         }
         if self.data.is_null() {
@@ -192,9 +189,9 @@ impl View {
                     }
                 }
             }
-            // SAFETY: the caller promises that the row is there.
+            // SAFETY: the caller guarantees that the row exists.
             let to = unsafe { self.data.cast::<u8>().add(y * self.stride) };
-            // SAFETY: both rows have these bytes, and one of them was made here.
+            // SAFETY: both rows have this many bytes, and one of them was allocated here.
             unsafe { row.as_ptr().copy_to_nonoverlapping(to, row.len()) };
         }
     }

@@ -14,12 +14,12 @@ use crate::status::{Failure, Status, call};
 use crate::warnings;
 use crate::words;
 
-/// The cameras of a rectified pair: from disparities to depths.
+/// The cameras of a rectified pair, which turn disparities into depths.
 pub struct Rig {
     pub(crate) inner: depth::Rig,
-    /// (width, height) of the images, where it is known.
+    /// (width, height) of the images, if known.
     size: Option<(usize, usize)>,
-    /// Depths along the axis take none.
+    /// Not needed for depths along the axis.
     pub(crate) knows_principal_point: bool,
 }
 
@@ -30,19 +30,19 @@ impl Rig {
         Ok(Self { inner: depth::Rig::new(calibration)?, size, knows_principal_point: true })
     }
 
-    /// Refuses a map of another size than that of the calibration.
+    /// Refuses a map whose size differs from the calibration.
     pub(crate) fn check(&self, (width, height): (u32, u32)) -> Result<(), Failure> {
         match self.size.filter(|known| *known != (width as usize, height as usize)) {
             Some((w, h)) => Err(Failure::argument(format!(
-                "the map is {width} x {height} and the calibration of images of {w} x {h}: depth takes the calibration of this size"
+                "the map is {width} x {height} but the calibration is for images of {w} x {h}: give the calibration of this size"
             ))),
             None => Ok(()),
         }
     }
 }
 
-/// The rig of a pair that is rectified already, by its focal length and doffs (cx of the right camera less cx of the left one; mostly 0) in
-/// pixels, and by its baseline, whose unit is that of all depths.
+/// Makes the rig of a rectified pair from its focal length and doffs (cx of the right camera minus cx of the left one; usually 0) in
+/// pixels, and its baseline, whose unit applies to all depths.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_rig_new(focal: f64, baseline: f64, doffs: f64, rig: *mut *mut Rig) -> Status {
     let make = || {
@@ -60,23 +60,23 @@ pub unsafe extern "C" fn mrfgs_rig_new(focal: f64, baseline: f64, doffs: f64, ri
         calibration.doffs = Some(doffs);
         Ok(Rig { knows_principal_point: false, ..Rig::of(&calibration)? })
     };
-    // SAFETY: the caller promises that a pointer can be written there.
+    // SAFETY: the caller guarantees that `rig` is null or writable.
     unsafe { argument::make("rig", rig, make) }
 }
 
-/// The rig of a pair that is rectified already, by its calibration. One that is for images of several sizes is refused: give
-/// mrfgs_rig_new() the numbers of yours.
+/// Makes the rig of a rectified pair from its calibration. A calibration for several image sizes is refused: use mrfgs_rig_new() with the
+/// values for yours.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_rig_of_calibration(
     calibration: *const Calibration,
     rig: *mut *mut Rig,
 ) -> Status {
     let make = || {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let calibration = unsafe { argument::thing("calibration", calibration) }?;
         let rectified = calibration.0.of_rectified_images(None)?.ok_or_else(|| {
             Failure::argument(
-                "the calibration is of images that are not rectified: use mrfgs_rig_of_rectification(), or give that of the \
+                "the calibration describes images that are not rectified: use mrfgs_rig_of_rectification(), or give that of the \
                  rectified pair",
             )
         })?;
@@ -85,31 +85,31 @@ pub unsafe extern "C" fn mrfgs_rig_of_calibration(
         warnings::say(doubts.iter().map(words::doubt));
         Ok(rig)
     };
-    // SAFETY: the caller promises that a pointer can be written there.
+    // SAFETY: the caller guarantees that `rig` is null or writable.
     unsafe { argument::make("rig", rig, make) }
 }
 
-/// The rig of what a rectification makes.
+/// Makes the rig of the pairs that a rectification gives.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_rig_of_rectification(
     rectification: *const Rectification,
     rig: *mut *mut Rig,
 ) -> Status {
     let make = || {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let rectification = unsafe { argument::thing("rectification", rectification) }?;
         let Rig { inner, size, .. } = Rig::of(&rectification.by.calibration()?)?;
         let [rectifying, _] = rectification.by.rotations();
         Ok(Rig { inner: inner.rectified_by(rectifying), size, knows_principal_point: true })
     };
-    // SAFETY: the caller promises that a pointer can be written there.
+    // SAFETY: the caller guarantees that `rig` is null or writable.
     unsafe { argument::make("rig", rig, make) }
 }
 
-/// The unit of the baseline, and so of depths: "mm", "cm", "m", or "unknown"; null for a rig that is null. It stays as it is.
+/// The unit of the baseline and of depths: "mm", "cm", "m", or "unknown"; null for a null rig. Always valid.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_rig_unit(rig: *const Rig) -> *const c_char {
-    // SAFETY: the caller promises that the pointer is null or good.
+    // SAFETY: the caller guarantees that the pointer is null or valid.
     let unit = unsafe { rig.as_ref() }.map(|rig| match rig.inner.unit() {
         Unit::Millimetre => c"mm",
         Unit::Centimetre => c"cm",
@@ -119,8 +119,8 @@ pub unsafe extern "C" fn mrfgs_rig_unit(rig: *const Rig) -> *const c_char {
     unit.map_or(std::ptr::null(), std::ffi::CStr::as_ptr)
 }
 
-/// The depth of every pixel along the optical axis, in the unit of the baseline, of a map of disparities in pixels: +infinity where there
-/// is none. Strides are in bytes. Both maps may be one.
+/// The depth of every pixel along the optical axis, in the unit of the baseline, from a disparity map in pixels: +infinity if unknown.
+/// Strides are in bytes. Both maps may be the same memory.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_depth(
     rig: *const Rig,
@@ -132,10 +132,10 @@ pub unsafe extern "C" fn mrfgs_depth(
     depth_stride: usize,
 ) -> Status {
     call(|| {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let rig = unsafe { argument::thing("rig", rig) }?;
         let given = [("disparity", disparity, disparity_stride)];
-        // SAFETY: the caller promises that the maps are as large as the arguments say.
+        // SAFETY: the caller guarantees that the maps are as large as the arguments say.
         unsafe {
             put_each(rig, (width, height), given, ("depth", depth, depth_stride), |[d]| {
                 rig.inner.depth(f64::from(d)).map_or(f32::INFINITY, |depth| depth as f32)
@@ -144,8 +144,8 @@ pub unsafe extern "C" fn mrfgs_depth(
     })
 }
 
-/// The error to expect of every depth, in the unit of the baseline, of maps of disparities and of their errors (mrfgs_maps.sigma), both
-/// in pixels: +infinity where there is none. Strides are in bytes. The maps may be one.
+/// The expected error of every depth, in the unit of the baseline, from maps of disparities and of their errors (mrfgs_maps.sigma), both in
+/// pixels: +infinity if unknown. Strides are in bytes. The maps may be the same memory.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_depth_sigma(
     rig: *const Rig,
@@ -159,10 +159,10 @@ pub unsafe extern "C" fn mrfgs_depth_sigma(
     depth_sigma_stride: usize,
 ) -> Status {
     call(|| {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let rig = unsafe { argument::thing("rig", rig) }?;
         let given = [("disparity", disparity, disparity_stride), ("sigma", sigma, sigma_stride)];
-        // SAFETY: the caller promises that the maps are as large as the arguments say.
+        // SAFETY: the caller guarantees that the maps are as large as the arguments say.
         unsafe {
             put_each(
                 rig,
@@ -179,10 +179,10 @@ pub unsafe extern "C" fn mrfgs_depth_sigma(
     })
 }
 
-/// Writes `value` of each pixel of the given maps to `to`. Each map has its name and its stride.
+/// Writes `value` of each pixel of the given maps to `to`. Each map comes with name and stride.
 ///
 /// # Safety
-/// A map is null, or as large as its stride and the size say.
+/// Each map is null, or as large as its stride and the size say.
 unsafe fn put_each<const N: usize>(
     rig: &Rig,
     (width, height): (u32, u32),
@@ -198,20 +198,20 @@ unsafe fn put_each<const N: usize>(
     for y in 0..size.1 {
         for x in 0..size.0 {
             let offset = |stride: usize| y * stride + x * size_of::<f32>();
-            // SAFETY: the pixel is in the map, as the caller promises.
+            // SAFETY: the caller guarantees that the pixel is in the map.
             let values = given
                 .map(|(_, map, stride)| unsafe { map.wrapping_byte_add(offset(stride)).read_unaligned() });
             let values = value(values);
-            // SAFETY: the same.
+            // SAFETY: as above.
             unsafe { to.wrapping_byte_add(offset(stride)).write_unaligned(values) };
         }
     }
     Ok(())
 }
 
-/// Frees a rig; it may be null.
+/// Frees a rig; null is allowed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_rig_free(rig: *mut Rig) {
-    // SAFETY: the caller promises that it was made here, and is freed once.
+    // SAFETY: the caller guarantees that it was made here and is freed once.
     unsafe { argument::free(rig) }
 }

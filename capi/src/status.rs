@@ -1,4 +1,4 @@
-//! How a call ends, and what is said of it: no panic leaves the library.
+//! The status of calls and their errors; no panic leaves the library.
 
 use std::ffi::c_char;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,23 +8,23 @@ use mrfgs::Error;
 use crate::text::Said;
 use crate::words;
 
-/// How a call ended.
+/// The result of a call.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub enum Status {
-    /// It did what it should.
+    /// The call succeeded.
     Ok = 0,
-    /// An argument makes no sense, or arguments do not fit each other.
+    /// An argument is invalid, or arguments are inconsistent.
     Argument = 1,
     /// A file cannot be read.
     File = 2,
-    /// There is no device, or the one that there is failed.
+    /// There is no device, or it failed.
     Device = 3,
-    /// The machine or the device has not enough memory.
+    /// The machine or the device has too little memory.
     Memory = 4,
-    /// mrfgs_matcher_stop() ended the match.
+    /// mrfgs_matcher_stop() stopped the match.
     Stopped = 5,
-    /// The library is at fault. Please report it.
+    /// A bug in the library. Please report it.
     Defect = 6,
 }
 
@@ -35,7 +35,7 @@ pub(crate) struct Failure {
 }
 
 impl Failure {
-    /// For an argument that the library never sees.
+    /// For an argument refused before the library sees it.
     pub(crate) fn argument(text: impl Into<String>) -> Self {
         Self { status: Status::Argument, text: text.into() }
     }
@@ -62,22 +62,20 @@ thread_local! {
     static LAST: Said = const { Said::nothing() };
 }
 
-/// What was wrong with the last call of this thread that failed; "" where none has. It stays until the next call of this thread that
-/// fails.
+/// The error of this thread's last failed call; "" without any. Valid until this thread's next failed call.
 #[unsafe(no_mangle)]
 pub extern "C" fn mrfgs_last_error() -> *const c_char {
     LAST.with(Said::text)
 }
 
-/// Does what a function of the header does, and turns what goes wrong into a status.
+/// Runs the body of an exported function, and turns errors and panics into a status.
 pub(crate) fn call(body: impl FnOnce() -> Result<(), Failure>) -> Status {
     let failure = match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Ok(())) => return Status::Ok,
         Ok(Err(failure)) => failure,
-        Err(_) => Failure {
-            status: Status::Defect,
-            text: "the library panicked, which is a defect of mrfgs".into(),
-        },
+        Err(_) => {
+            Failure { status: Status::Defect, text: "the library panicked, which is a bug in mrfgs".into() }
+        }
     };
     LAST.with(|last| last.say(&failure.text));
     failure.status

@@ -1,4 +1,4 @@
-//! Video that holds still where the scene does.
+//! Temporal smoothing of video.
 
 use std::ptr;
 
@@ -11,21 +11,20 @@ use crate::frame::{self, Image};
 use crate::maps::{Maps, put, read};
 use crate::status::{Failure, Status, call};
 
-/// A filter for the maps of a sequence: where the left image does not change, the disparity follows that of the frames before.
+/// A filter for the maps of a sequence that steadies still surfaces by averaging with earlier frames.
 pub struct Steady(Turns<steady::Steady>);
 
-/// A filter that has seen no frame yet.
+/// Makes a filter without frames.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_steady_new(steady: *mut *mut Steady) -> Status {
-    // SAFETY: the caller promises that a pointer can be written there.
+    // SAFETY: the caller guarantees that `steady` is null or writable.
     unsafe { argument::make("steady", steady, || Ok(Steady(Turns::default()))) }
 }
 
-/// Lets the disparities of the next frame follow those of the frames before, weighted by confidence, where the left image has not changed.
-/// `left` is the image that was matched, and `maps` are what the match has written: disparity, confidence and validity, of which the
-/// disparity is changed and the others are read. A frame of another size begins a new sequence. Calls for one filter take turns.
-/// For images of 8 bits these are the maps of `mrfgs sequence --steady`; deeper ones are scaled by their own values, where the program
-/// looks at both views.
+/// Smooths the disparities of the next frame: where the left image has not changed, they are averaged with earlier frames, weighted by
+/// confidence. `left` is the image that was matched, and `maps` are the results: disparity, which is changed, and confidence and validity,
+/// which are read. Another image size starts a new sequence. Calls for one filter take turns. For 8-bit images the maps equal those of
+/// `mrfgs sequence --steady`; deeper ones are scaled by their own values, unlike in the program, which uses both views.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_steady_follow(
     steady: *const Steady,
@@ -33,11 +32,11 @@ pub unsafe extern "C" fn mrfgs_steady_follow(
     maps: *const Maps,
 ) -> Status {
     call(|| {
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let steady = unsafe { argument::thing("steady", steady) }?;
-        // SAFETY: the caller promises that the image is what its fields say until this returns.
+        // SAFETY: the caller guarantees that the image matches its fields until this returns.
         let pair = unsafe { frame::pair([left, left], [ptr::null(); 2]) }?;
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let given = unsafe { Maps::given(maps) }?;
         let size = pair.size();
         given.check(size)?;
@@ -47,25 +46,25 @@ pub unsafe extern "C" fn mrfgs_steady_follow(
             ("validity", given.validity.is_null()),
         ];
         if let Some((name, _)) = needed.into_iter().find(|(_, is_null)| *is_null) {
-            return Err(Failure::argument(format!("the map maps.{name} is null: the filter takes it")));
+            return Err(Failure::argument(format!("the map maps.{name} is null: the filter needs it")));
         }
-        // SAFETY: it was checked, and the caller promises that it is as large as its fields say.
+        // SAFETY: it was checked, and the caller guarantees that it is as large as its fields say.
         let disparity = unsafe { read(given.disparity.cast_const(), given.disparity_stride, size) };
-        // SAFETY: the same.
+        // SAFETY: as above.
         let confidence = unsafe { read(given.confidence.cast_const(), given.confidence_stride, size) };
-        // SAFETY: the same.
+        // SAFETY: as above.
         let validity = unsafe { read(given.validity.cast_const(), given.validity_stride, size) };
         let mut found = maps::Maps::from_pixels(&disparity, confidence, validity);
         steady.0.turn()?.follow(pair.left(), &mut found);
-        // SAFETY: the same.
+        // SAFETY: as above.
         unsafe { put(&found.final_map(), given.disparity, given.disparity_stride) };
         Ok(())
     })
 }
 
-/// Frees a filter; it may be null.
+/// Frees a filter; null is allowed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_steady_free(steady: *mut Steady) {
-    // SAFETY: the caller promises that it was made here, and is freed once.
+    // SAFETY: the caller guarantees that it was made here and is freed once.
     unsafe { argument::free(steady) }
 }

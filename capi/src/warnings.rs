@@ -1,4 +1,4 @@
-//! What is probably wrong with a pair.
+//! Warnings about probable faults.
 
 use std::ffi::c_char;
 use std::ptr;
@@ -15,16 +15,15 @@ thread_local! {
     static LAST: Said = const { Said::nothing() };
 }
 
-/// Looks for what is probably wrong with a pair (views swapped, turned or not rectified, one of them far darker), and for a range that
-/// cuts off a part of the scene; without a range (null) only for the former. mrfgs_last_warnings() says what it has found. It takes a
-/// part of the time of a match.
+/// Checks a pair for probable faults (views swapped, turned or not rectified, one far darker), and whether the range clips the scene;
+/// without a range (null) only for the former. mrfgs_last_warnings() lists them. It takes a fraction of the time of a match.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_check(left: *const Image, right: *const Image, range: *const Range) -> Status {
-    // SAFETY: the caller promises what is needed.
+    // SAFETY: the caller guarantees all requirements.
     unsafe { mrfgs_check_masked(left, right, ptr::null(), ptr::null(), range) }
 }
 
-/// The same with masks, as mrfgs_match_masked() takes them.
+/// Like mrfgs_check() with masks, as for mrfgs_match_masked().
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_check_masked(
     left: *const Image,
@@ -34,18 +33,18 @@ pub unsafe extern "C" fn mrfgs_check_masked(
     range: *const Range,
 ) -> Status {
     call(|| {
-        // SAFETY: the caller promises that the images are what their fields say until this returns.
+        // SAFETY: the caller guarantees that the images match their fields until this returns.
         let pair = unsafe { frame::pair([left, right], [left_mask, right_mask]) }?;
-        // SAFETY: the caller promises that the pointer is null or good.
+        // SAFETY: the caller guarantees that the pointer is null or valid.
         let range = unsafe { Range::searched(range) }?;
         say(check::warnings(&pair, range).iter().map(words::warning));
         Ok(())
     })
 }
 
-/// What the last mrfgs_check() of this thread has found to be probably wrong, or the last mrfgs_match(), which sees whether many
-/// disparities are at an end of the range, or the last mrfgs_rectification_new() or mrfgs_rig_of_calibration(), which see whether the
-/// calibration is of other images or in another unit; a line for each, "" where all seems well. It stays until the next one that succeeds.
+/// The probable faults found by this thread's last mrfgs_check(), by its last mrfgs_match() (many disparities at an end of the range), or
+/// by its last mrfgs_rectification_new() or mrfgs_rig_of_calibration() (a calibration for other images or in another unit), one per line;
+/// "" without any. Valid until the next such call that succeeds.
 #[unsafe(no_mangle)]
 pub extern "C" fn mrfgs_last_warnings() -> *const c_char {
     LAST.with(Said::text)

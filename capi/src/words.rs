@@ -1,4 +1,4 @@
-//! What the library reports, in the words of C: each cause with the call or the option that helps.
+//! Messages of the library with remedies for C users.
 
 use mrfgs::Error;
 use mrfgs::check::Warning;
@@ -13,8 +13,8 @@ const WORDS: Vocabulary = Vocabulary {
     fork: "make no matcher with a device before the fork",
     cpu: "set mrfgs_options_device(options, \"cpu\")",
     memory: Some(["option \"memory\"", ""]),
-    mask: Some("give alpha 0 to what is no image"),
-    unit: Some("state the right one by mrfgs_calibration_unit()"),
+    mask: Some("give alpha 0 to everything that is not image"),
+    unit: Some("set the right one with mrfgs_calibration_unit()"),
     crop: Some("mrfgs_calibration_crop()"),
     ..Vocabulary::PLAIN
 };

@@ -1,5 +1,5 @@
-//! Frames for the tests in C: `frames KIND FROM TO` writes the middle of a picture as PNM; KIND is `rgb`, `grey`, `grey16` for 16
-//! bits, or `float` for PFM. `frames map FROM TO` writes a grey map as it is, and `frames whole FROM TO` a picture in colour.
+//! Makes frames for the tests in C: `frames KIND FROM TO` writes the middle of a picture as PNM (KIND `rgb`, `grey` or `grey16`) or PFM
+//! (KIND `float`). `frames map FROM TO` converts a grey map unchanged, and `frames whole FROM TO` a colour picture.
 
 use image::{DynamicImage, ImageBuffer, ImageError, Luma};
 
@@ -31,7 +31,7 @@ fn frame(picture: &DynamicImage, kind: &str) -> DynamicImage {
         "grey" => frame.to_luma8().into(),
         "grey16" => {
             let mut frame = frame.to_luma16();
-            // Values that are no multiples of 257, which would stand for 8 bits.
+            // Values that are not multiples of 257, which would be equivalent to 8 bits.
             frame.pixels_mut().for_each(|pixel| pixel.0[0] /= 23);
             frame.into()
         }
@@ -51,7 +51,7 @@ fn write(to: &str, picture: &DynamicImage) -> Result<(), ImageError> {
     Ok(std::fs::write(to, [head.into_bytes(), samples].concat())?)
 }
 
-/// Rows from the bottom to the top.
+/// Rows from bottom to top.
 fn write_float(to: &str, picture: &GrayImage16) -> Result<(), ImageError> {
     let mut bytes = format!("Pf\n{} {}\n-1.0\n", picture.width(), picture.height()).into_bytes();
     for row in picture.as_raw().chunks(picture.width() as usize).rev() {

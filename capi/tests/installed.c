@@ -1,4 +1,4 @@
-/* What an installed library must do: match a pair whose disparity is 5 everywhere. scripts/release runs it where there is no compiler. */
+/* Tests an installed library: matches a pair with disparity 5 everywhere. scripts/release runs it where there is no compiler. */
 #include <mrfgs.h>
 
 #include <stdint.h>

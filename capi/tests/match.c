@@ -1,4 +1,4 @@
-/* Matches frames whose rows lie at odd distances and compares the maps with those of the program: bytes must be equal.
+/* Matches frames with padded rows, and compares the maps with those of the program byte by byte.
  *
  *     match-c LEFT.pnm RIGHT.pnm MAX-DISPARITY MAP.pfm CONFIDENCE.pgm VALIDITY.pgm RIGHT-MAP.pfm SIGMA.pfm REGION.pfm STEADY.pfm
  *
@@ -31,7 +31,7 @@ static void check(int holds, const char *condition, int line) {
     }
 }
 
-/* The call fails like this, and says all these words. */
+/* Checks that the call fails with this status, and that its message contains all these words. */
 static void refused(mrfgs_status expected, mrfgs_status status, const char *word, const char *other) {
     if (status != expected || !strstr(mrfgs_last_error(), word) || !strstr(mrfgs_last_error(), other)) {
         fprintf(stderr, "match.c: status %d and not %d, without `%s` or `%s`: %s\n", (int)status, (int)expected, word, other,
@@ -40,7 +40,7 @@ static void refused(mrfgs_status expected, mrfgs_status status, const char *word
     }
 }
 
-/* A frame with `more` bytes behind each row. */
+/* A frame with `more` bytes of padding after each row. */
 static mrfgs_image spread(const struct pnm *pnm, size_t more) {
     size_t row = pnm->width * pnm->channels * pnm->bytes, stride = row + more;
     uint8_t *data = malloc(stride * pnm->height);
@@ -53,7 +53,7 @@ static mrfgs_image spread(const struct pnm *pnm, size_t more) {
     return image;
 }
 
-/* Whether the rows of a map are those of `expected`, and the bytes behind them untouched. */
+/* Whether the rows of a map equal `expected`, and the padding is untouched. */
 static int same(const uint8_t *map, size_t stride, const struct pnm *expected) {
     size_t row = expected->width * expected->bytes;
     for (size_t y = 0; y < expected->height; y++) {
@@ -79,7 +79,7 @@ static void compare(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ra
         CHECK(mrfgs_match(matcher, &left, &right, &range, &all) == MRFGS_STATUS_OK);
         for (int i = 0; i < 5; i++) CHECK(same(found[i], strides[i], &maps[i]));
         CHECK(memcmp(maps[0].data, maps[3].data, maps[0].width * maps[0].height * sizeof(float)) != 0);
-        /* Callers with earlier headers, whose memory ends where their structure does. */
+        /* Callers compiled with earlier headers, which have shorter structures. */
         const size_t sizes[2] = {FIRST_SIZE, SECOND_SIZE};
         for (int n = 0; n < 2; n++) {
             mrfgs_maps *earlier = malloc(sizes[n]);
@@ -90,10 +90,10 @@ static void compare(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ra
             for (int i = 0; i < 5; i++) CHECK(same(found[i], strides[i], &maps[i]) == (i < 3 + n));
             free(earlier);
         }
-        /* Control: the comparison sees one bit. */
+        /* Control: the comparison detects one flipped bit. */
         found[0][strides[0]] ^= 1;
         CHECK(!same(found[0], strides[0], &maps[0]));
-        /* One map alone. */
+        /* A single map. */
         memset(found[2], 0x5a, strides[2] * maps[2].height);
         mrfgs_maps one = {.size = sizeof one, .validity = found[2], .validity_stride = strides[2]};
         CHECK(mrfgs_match(matcher, &left, &right, &range, &one) == MRFGS_STATUS_OK);
@@ -105,7 +105,7 @@ static void compare(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ra
     CHECK(strlen(mrfgs_last_device()) > 0 && strlen(mrfgs_last_note()) == 0);
 }
 
-/* A frame of bytes in another format: with blue before red, alpha, or 16 bits. */
+/* Converts a frame to another format: BGR, with alpha, or with 16 bits. */
 static mrfgs_image converted(const struct pnm *pnm, mrfgs_format format, const uint8_t *mask) {
     int words = format == MRFGS_FORMAT_RGB16 || format == MRFGS_FORMAT_RGBA16 || format == MRFGS_FORMAT_BGR16 ||
                 format == MRFGS_FORMAT_BGRA16;
@@ -125,7 +125,7 @@ static mrfgs_image converted(const struct pnm *pnm, mrfgs_format format, const u
     return image;
 }
 
-/* A region alone gives the program's map of it. */
+/* A region gives the program's map of that region. */
 static void region(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm *part) {
     mrfgs_image left = spread(&frames[0], 0), right = spread(&frames[1], 3);
     mrfgs_region at = {31, 20, 45, 30};
@@ -135,7 +135,7 @@ static void region(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ran
     mrfgs_maps maps = {.size = sizeof maps, .disparity = found, .disparity_stride = part->width * sizeof(float)};
     CHECK(mrfgs_match_region(matcher, &left, &right, NULL, NULL, &range, &at, &maps) == MRFGS_STATUS_OK);
     CHECK(memcmp(found, part->data, bytes) == 0);
-    /* Control: another region has another map. */
+    /* Control: another region gives another map. */
     at.x += 1;
     CHECK(mrfgs_match_region(matcher, &left, &right, NULL, NULL, &range, &at, &maps) == MRFGS_STATUS_OK);
     CHECK(memcmp(found, part->data, bytes) != 0);
@@ -146,7 +146,7 @@ static void region(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ran
     free(found);
 }
 
-/* Every format of colours gives the map of the first one, and masks are what alpha is. */
+/* All colour formats give the same map, and alpha acts as a mask. */
 static void formats(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm *map) {
     size_t pixels = map->width * map->height, stride = map->width * sizeof(float);
     float *found = malloc(pixels * sizeof *found), *masked = malloc(pixels * sizeof *masked);
@@ -156,7 +156,7 @@ static void formats(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ra
         mrfgs_image left = converted(&frames[0], format, NULL), right = converted(&frames[1], format, NULL);
         CHECK(mrfgs_match(matcher, &left, &right, &range, &maps) == MRFGS_STATUS_OK);
         CHECK(memcmp(found, map->data, pixels * sizeof *found) == 0);
-        /* Control: the order of the channels counts. */
+        /* Control: the order of the channels matters. */
         right.format = format == MRFGS_FORMAT_RGB8 ? MRFGS_FORMAT_BGR8 : right.format;
         CHECK(mrfgs_match(matcher, &left, &right, &range, &maps) == MRFGS_STATUS_OK);
         CHECK((memcmp(found, map->data, pixels * sizeof *found) == 0) == (format != MRFGS_FORMAT_RGB8));
@@ -174,7 +174,7 @@ static void formats(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ra
     CHECK(mrfgs_match_masked(matcher, &plain[0], &plain[1], &masks[0], &masks[1], &range, &maps) == MRFGS_STATUS_OK);
     CHECK(memcmp(found, masked, pixels * sizeof *found) == 0);
     for (size_t i = 0; i < pixels; i++) CHECK((masked[i] > 1e30f) == (left_mask[i] != 0));
-    /* Control: the mask of the right image counts, too. */
+    /* Control: the mask of the right image matters, too. */
     CHECK(mrfgs_match_masked(matcher, &plain[0], &plain[1], &masks[0], NULL, &range, &maps) == MRFGS_STATUS_OK);
     CHECK(memcmp(found, masked, pixels * sizeof *found) != 0);
     memset(left_mask, 1, pixels);
@@ -194,7 +194,7 @@ static void formats(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ra
     free(masked);
 }
 
-/* What is probably wrong is said, and only that. */
+/* Likely problems are reported, and nothing else. */
 static void warnings(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range) {
     mrfgs_image left = spread(&frames[0], 1), right = spread(&frames[1], 0);
     CHECK(mrfgs_check(&left, &right, &range) == MRFGS_STATUS_OK && strlen(mrfgs_last_warnings()) == 0);
@@ -211,7 +211,7 @@ static void warnings(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_r
     free((void *)right.data);
 }
 
-/* Every preset has a name by which it is taken. */
+/* Every preset is accepted by its name. */
 static void presets(void) {
     mrfgs_options *options = mrfgs_options_new();
     uint32_t count = 0, fast = 0;
@@ -234,7 +234,7 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     refused(wrong, mrfgs_options_set(options, "fill", "sand"), "\"fill\"", "sand");
     refused(wrong, mrfgs_options_set(options, "fill", "sand"), "none", "row");
     refused(wrong, mrfgs_options_set(options, "levels", "17"), "\"levels\"", "1 to 16");
-    refused(wrong, mrfgs_options_threads(options, 1025), "threads are 1025", "1 to 1024");
+    refused(wrong, mrfgs_options_threads(options, 1025), "threads is 1025", "1 to 1024");
     refused(wrong, mrfgs_options_set(options, NULL, "none"), "key", "null");
     refused(wrong, mrfgs_options_set(options, "fill", NULL), "value", "null");
     refused(wrong, mrfgs_options_device(options, NULL), "name", "null");
@@ -267,11 +267,11 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     bad = image, bad.stride = 1;
     refused(wrong, mrfgs_match(matcher, &bad, &image, &range, &maps), "left", "stride of 1");
     bad = image, bad.stride = SIZE_MAX / 2;
-    refused(wrong, mrfgs_match(matcher, &bad, &image, &range, &maps), "left", "no memory");
+    refused(wrong, mrfgs_match(matcher, &bad, &image, &range, &maps), "left", "too large for memory");
     bad = image, bad.width -= 1;
     refused(wrong, mrfgs_match(matcher, &image, &bad, &range, &maps), "one size", "121");
     bad = image, bad.height = 0;
-    refused(wrong, mrfgs_match(matcher, &bad, &bad, &range, &maps), "holds no pixel", "0");
+    refused(wrong, mrfgs_match(matcher, &bad, &bad, &range, &maps), "has no pixels", "0");
     mrfgs_range empty = {5, 4}, far = {0, 1 << 30};
     refused(wrong, mrfgs_match(matcher, &image, &image, &empty, &maps), "range", "raise range.max");
     refused(wrong, mrfgs_match(matcher, &image, &image, &far, &maps), "range", "1073741824");
@@ -284,7 +284,7 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     refused(wrong, mrfgs_match(matcher, &image, &image, &range, &small), "maps.size is 57", "sizeof(mrfgs_maps) is 88");
     small = maps, small.size = 8;
     refused(wrong, mrfgs_match(matcher, &image, &image, &range, &small), "maps.size is 8", "header");
-    /* The next match is stopped, and the one after it is not. */
+    /* Cancels the next match, but not the one after it. */
     CHECK(mrfgs_matcher_stop(matcher) == MRFGS_STATUS_OK);
     refused(MRFGS_STATUS_STOPPED, mrfgs_match(matcher, &image, &image, &range, &maps), "interrupted", "");
     for (size_t i = 0; i < pixels; i++) CHECK(disparity[i] == -1);
@@ -294,7 +294,7 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     free((void *)image.data);
 }
 
-/* The frame follows one that showed LEFT twice, which is surer of itself: the program's map is `expected`. */
+/* The frame follows one that showed LEFT twice, and was more certain: the program's map is `expected`. */
 static void steady(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm *expected) {
     mrfgs_image left = spread(&frames[0], 3), right = spread(&frames[1], 0);
     size_t width = left.width, height = left.height, stride = width * sizeof(float) + 5, bytes = stride * height;
@@ -307,7 +307,7 @@ static void steady(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ran
     CHECK(mrfgs_match(matcher, &left, &left, &range, &maps) == MRFGS_STATUS_OK);
     CHECK(mrfgs_steady_follow(filter, &left, &maps) == MRFGS_STATUS_OK);
     CHECK(mrfgs_match(matcher, &left, &right, &range, &maps) == MRFGS_STATUS_OK);
-    /* Control: alone it is another map. */
+    /* Control: without that history the map differs. */
     CHECK(!same(disparity, stride, expected));
     CHECK(mrfgs_steady_follow(filter, &left, &maps) == MRFGS_STATUS_OK);
     CHECK(same(disparity, stride, expected));
@@ -389,7 +389,7 @@ int main(int argc, char **argv) {
     region(matcher, frames, range, &part);
     free(part.data);
     struct pnm led = pnm_read(argv[10]);
-    /* Words and floats are scaled by both views of a pair, and the filter sees one. */
+    /* 16-bit and float images are scaled by both views of a pair, but the filter sees only one. */
     if (frames[0].bytes == 1) steady(matcher, frames, range, &led);
     free(led.data);
     if (frames[0].channels == 3) formats(matcher, frames, range, &maps[0]);

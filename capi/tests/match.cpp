@@ -1,5 +1,5 @@
-// Matches the frames of a video in C++, from several threads: a matcher that all share, and one for each. The maps must have the bytes
-// of the program's.
+// Matches the frames of a video in C++ from several threads, with a shared matcher and with one per thread. The maps must be identical to
+// those of the program.
 //
 //     match-cpp LEFT.pnm RIGHT.pnm MAX-DISPARITY MAP.pfm
 #include "pnm.h"
@@ -49,7 +49,7 @@ mrfgs_image image_of(const pnm &frame) {
 }
 
 bool found(mrfgs_matcher *matcher, const pnm &left, const pnm &right, mrfgs_range range, const pnm &expected) {
-    // Rows that begin at odd addresses.
+    // Rows at odd addresses.
     const std::size_t row = expected.width * sizeof(float), stride = row + 5;
     std::vector<std::uint8_t> map(stride * expected.height + 1);
     mrfgs_maps maps{};
@@ -78,7 +78,7 @@ int main(int argc, char **argv) try {
             const Matcher own = i == 0 ? matcher_of("fast") : nullptr;
             mrfgs_matcher *matcher = own ? own.get() : shared.get();
             for (int frame = 0; frame < 2; frame++) right_ones[i] += found(matcher, left, right, range, expected);
-            // Each thread has errors of its own.
+            // Each thread has its own errors.
             if (mrfgs_matcher_new(nullptr, nullptr) != MRFGS_STATUS_ARGUMENT || !*mrfgs_last_error()) right_ones[i] = 0;
         });
     }

@@ -1,5 +1,5 @@
-/* Reads frames and maps: PGM, PPM, and grey PFM, whose rows go from the bottom to the top. Samples get the byte order of the machine,
- * which is little-endian here. */
+/* Reads frames and maps: PGM, PPM and grey PFM with its rows from bottom to top. Converts samples to little-endian, the byte order of the
+ * test machines. */
 #ifndef PNM_H
 #define PNM_H
 

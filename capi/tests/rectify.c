@@ -1,9 +1,9 @@
-/* Rectifies raw frames, matches the views and takes depths, and compares all with what the program makes: bytes must be equal.
+/* Rectifies raw frames, matches them and computes depths, and compares all with the program's output byte by byte.
  *
  *     rectify-c CAMERAS.yml RECTIFIED.yml LEFT.ppm RIGHT.ppm VIEW0.ppm VIEW1.ppm MASK0.pgm MASK1.pgm MAX-DISPARITY MAP.pfm RIGHT-MAP.pfm \
  *         DEPTH.pfm DEPTH-SIGMA.pfm THIRD.yml DEPTH-REGISTERED.pfm WRONG.yml CORRECTED.pfm
  *
- * Then it makes the mistakes that a caller can make. */
+ * Then tests the errors that a caller can cause. */
 #include "pnm.h"
 
 #include <mrfgs.h>
@@ -17,7 +17,7 @@ static void check(int holds, const char *condition, int line) {
     }
 }
 
-/* The call fails like this, and says both words. */
+/* Checks that the call fails with this status, and that its message contains both words. */
 static void refused(mrfgs_status expected, mrfgs_status status, const char *word, const char *other) {
     if (status != expected || !strstr(mrfgs_last_error(), word) || !strstr(mrfgs_last_error(), other)) {
         fprintf(stderr, "rectify.c: status %d and not %d, without `%s` or `%s`: %s\n", (int)status, (int)expected, word, other,
@@ -39,7 +39,7 @@ static mrfgs_image image_of(const struct pnm *pnm, mrfgs_format format) {
     return image;
 }
 
-/* Both views in `format`, with 5 bytes behind each row, as the caller's memory has them. */
+/* Both views in `format`, with 5 bytes of padding after each row. */
 struct views {
     size_t stride, mask_stride;
     uint8_t *data[2], *masks[2];
@@ -66,7 +66,7 @@ static void free_views(struct views *views) {
     for (int i = 0; i < 2; i++) free(views->data[i]), free(views->masks[i]);
 }
 
-/* Whether rows are those of `expected`, and the bytes behind them untouched. */
+/* Whether the rows equal `expected`, and the padding is untouched. */
 static int same(const uint8_t *rows, size_t stride, const struct pnm *expected) {
     size_t row = expected->width * expected->channels * expected->bytes;
     for (size_t y = 0; y < expected->height; y++) {
@@ -83,10 +83,10 @@ static void views_are_the_programs(const mrfgs_rectification *by, const struct p
     struct views views = rectified(by, rgb, 3, MRFGS_FORMAT_RGB8);
     for (int i = 0; i < 2; i++) {
         CHECK(same(views.data[i], views.stride, &expected[i]) && same(views.masks[i], views.mask_stride, &masks[i]));
-        /* Control: the views are not exchanged. */
+        /* Control: the views are not swapped. */
         CHECK(!same(views.data[i], views.stride, &expected[1 - i]));
     }
-    /* The same bytes called otherwise, in and out; blue first, with alpha; and with 16 bits. */
+    /* Other formats, in and out: BGR, with alpha, and with 16 bits. */
     mrfgs_image bgr[2] = {image_of(&raw[0], MRFGS_FORMAT_BGR8), image_of(&raw[1], MRFGS_FORMAT_BGR8)};
     struct views others = rectified(by, bgr, 3, MRFGS_FORMAT_BGR8), alpha = rectified(by, rgb, 4, MRFGS_FORMAT_BGRA8),
                  words = rectified(by, rgb, 6, MRFGS_FORMAT_RGB16), grey = rectified(by, rgb, 1, MRFGS_FORMAT_GREY8);
@@ -132,7 +132,7 @@ static void maps_are_the_programs(const mrfgs_rectification *by, const char *cal
                        .sigma = sigma, .sigma_stride = stride};
     CHECK(mrfgs_match_masked(matcher, &left, &right, &masks[0], &masks[1], &range, &maps) == MRFGS_STATUS_OK);
     CHECK(memcmp(map, expected[0].data, bytes) == 0 && memcmp(of_right, expected[1].data, bytes) == 0);
-    /* Control: without masks, the borders match something. */
+    /* Control: without masks, the borders find matches. */
     maps.disparity = other, maps.sigma = NULL;
     CHECK(mrfgs_match(matcher, &left, &right, &range, &maps) == MRFGS_STATUS_OK && memcmp(other, map, bytes) != 0);
 
@@ -140,10 +140,10 @@ static void maps_are_the_programs(const mrfgs_rectification *by, const char *cal
     CHECK(mrfgs_rig_of_rectification(by, &rig) == MRFGS_STATUS_OK && strcmp(mrfgs_rig_unit(rig), "m") == 0);
     CHECK(mrfgs_depth(rig, width, height, map, stride, depth, stride) == MRFGS_STATUS_OK);
     CHECK(memcmp(depth, expected[2].data, bytes) == 0);
-    /* Control: of another map, other depths. In place. */
+    /* Control: another map gives other depths. In place. */
     memcpy(other, of_right, bytes);
     CHECK(mrfgs_depth(rig, width, height, other, stride, other, stride) == MRFGS_STATUS_OK && memcmp(other, depth, bytes) != 0);
-    /* The errors of depths, and a control: where disparities are twice as far off, depths are. */
+    /* The errors of depths. Control: twice the error of disparities gives larger errors of depths. */
     CHECK(mrfgs_depth_sigma(rig, width, height, map, stride, sigma, stride, other, stride) == MRFGS_STATUS_OK);
     CHECK(memcmp(other, expected[3].data, bytes) == 0);
     for (size_t i = 0; i < pixels; i++) sigma[i] *= 2;
@@ -156,7 +156,7 @@ static void maps_are_the_programs(const mrfgs_rectification *by, const char *cal
     refused(MRFGS_STATUS_ARGUMENT, mrfgs_depth(NULL, width, height, map, stride, depth, stride), "rig", "null");
     mrfgs_rig_free(rig);
 
-    /* The calibration of the rectified pair, whose digits are rounded. */
+    /* The calibration of the rectified pair, whose numbers are rounded. */
     mrfgs_calibration *calibration;
     CHECK(mrfgs_calibration_read(&calibration_path, 1, &calibration) == MRFGS_STATUS_OK);
     CHECK(mrfgs_rig_of_calibration(calibration, &rig) == MRFGS_STATUS_OK);
@@ -184,7 +184,7 @@ static void maps_are_the_programs(const mrfgs_rectification *by, const char *cal
     free(map), free(of_right), free(depth), free(other), free(sigma);
 }
 
-/* Depths in the view of a third camera. */
+/* Depths registered to a third camera. */
 static void third_camera_is_the_programs(const mrfgs_rectification *by, const char *rectified_path, const char *third_path,
                                          const struct pnm *map, const struct pnm *expected) {
     const mrfgs_status wrong = MRFGS_STATUS_ARGUMENT;
@@ -196,7 +196,7 @@ static void third_camera_is_the_programs(const mrfgs_rectification *by, const ch
     CHECK(mrfgs_third_camera_read(third_path, &camera) == MRFGS_STATUS_OK);
     CHECK(mrfgs_third_camera_size(camera, &wide, &high) == MRFGS_STATUS_OK && wide == expected->width && high == expected->height);
     CHECK(mrfgs_rig_of_rectification(by, &rig) == MRFGS_STATUS_OK);
-    /* 5 bytes behind each row stay as they are. */
+    /* 5 bytes of padding after each row remain untouched. */
     size_t out_stride = wide * sizeof(float) + 5;
     uint8_t *depth = malloc(out_stride * high), *other = malloc(bytes);
     memset(depth, 0x5a, out_stride * high);
@@ -208,7 +208,7 @@ static void third_camera_is_the_programs(const mrfgs_rectification *by, const ch
     float *out = (float *)(void *)other;
     CHECK(mrfgs_depth_registered(rig, width, height, disparity, stride, again, out, row) == MRFGS_STATUS_OK);
     CHECK(memcmp(other, expected->data, bytes) == 0);
-    /* Control: without the rotation of the rectification, the camera stands elsewhere. */
+    /* Control: without the rotation of the rectification, the pose of the camera is wrong. */
     mrfgs_calibration *calibration;
     CHECK(mrfgs_calibration_read(&rectified_path, 1, &calibration) == MRFGS_STATUS_OK);
     CHECK(mrfgs_rig_of_calibration(calibration, &other_rig) == MRFGS_STATUS_OK);
@@ -240,7 +240,7 @@ static void third_camera_is_the_programs(const mrfgs_rectification *by, const ch
     free(text), free(depth), free(other);
 }
 
-/* The map of raw frames, rectified. */
+/* The map of raw frames after rectification. */
 static void match_rectified(const mrfgs_matcher *matcher, const mrfgs_rectification *by, const mrfgs_image images[2], mrfgs_range range,
                             mrfgs_drift *drift, float *map) {
     uint32_t width, height;
@@ -258,7 +258,7 @@ static void match_rectified(const mrfgs_matcher *matcher, const mrfgs_rectificat
     free_views(&views);
 }
 
-/* The second of two frames of a rig that was calibrated wrongly. */
+/* The second of two frames from a rig with a wrong calibration. */
 static void drift_is_the_programs(const char *wrong_path, const struct pnm raw[2], mrfgs_range range, const struct pnm *expected) {
     const mrfgs_status wrong = MRFGS_STATUS_ARGUMENT;
     mrfgs_image images[2] = {image_of(&raw[0], MRFGS_FORMAT_RGB8), image_of(&raw[1], MRFGS_FORMAT_RGB8)};
@@ -281,7 +281,7 @@ static void drift_is_the_programs(const char *wrong_path, const struct pnm raw[2
     match_rectified(matcher, by, images, range, drift, map);
     /* Control: the first frame is not corrected. */
     CHECK(memcmp(map, expected->data, bytes) != 0);
-    /* The principal point is 3 px too high: the camera looks up by 0.8 degrees. */
+    /* The principal point is 3 px too high: the camera pitches up by 0.8 degrees. */
     CHECK(mrfgs_drift_turn(drift, &turn) == MRFGS_STATUS_OK && turn.matches > 100 && turn.counts == 1 && turn.rows > 2);
     CHECK(turn.degrees[0] > 0.6 && turn.degrees[0] < 1.0 && turn.errors[0] > 0 && turn.errors[0] < 0.1);
     CHECK(mrfgs_drift_correct(drift, &better) == MRFGS_STATUS_OK && better != NULL);
@@ -329,7 +329,7 @@ static void mistakes(const char *path, const mrfgs_calibration *calibration, mrf
     refused(wrong, mrfgs_rig_of_calibration(other, &rig), "not rectified", "mrfgs_rig_of_rectification");
     refused(wrong, mrfgs_rig_of_calibration(NULL, &rig), "calibration", "null");
     refused(wrong, mrfgs_rig_of_rectification(NULL, &rig), "rectification", "null");
-    /* A unit that is stated. */
+    /* A given unit. */
     mrfgs_rectification *in_cm;
     CHECK(mrfgs_calibration_unit(other, "cm") == MRFGS_STATUS_OK);
     CHECK(mrfgs_rectification_new(other, 0, 0, 0.5, 0, &in_cm) == MRFGS_STATUS_OK);
@@ -368,7 +368,7 @@ static void mistakes(const char *path, const mrfgs_calibration *calibration, mrf
     refused(wrong, mrfgs_rectify(by, &image, &image, &bad, &view), "left view", "8 or 16 bits");
     bad = view, bad.mask = data, bad.mask_stride = 239;
     refused(wrong, mrfgs_rectify(by, &image, &image, &bad, &view), "left view has a mask", "stride of 239");
-    /* A view that nobody wants. */
+    /* An unused view. */
     mrfgs_view nothing = {.size = sizeof nothing, .format = MRFGS_FORMAT_GREY8};
     CHECK(mrfgs_rectify(by, &image, &image, &view, &nothing) == MRFGS_STATUS_OK);
     free(data);
@@ -389,7 +389,7 @@ int main(int argc, char **argv) {
     CHECK(mrfgs_calibration_of_texts((const char *const *)&text, 1, &same_one) == MRFGS_STATUS_OK);
     CHECK(mrfgs_rectification_new(same_one, 240, 180, -1, 1, &again) == MRFGS_STATUS_OK);
     views_are_the_programs(again, &files[0], &files[2], &files[4]);
-    /* Control: another alpha makes other views. */
+    /* Control: another alpha gives other views. */
     CHECK(mrfgs_rectification_new(same_one, 240, 180, 1, 1, &wider) == MRFGS_STATUS_OK);
     mrfgs_image images[2] = {image_of(&files[0], MRFGS_FORMAT_RGB8), image_of(&files[1], MRFGS_FORMAT_RGB8)};
     struct views views = rectified(wider, images, 3, MRFGS_FORMAT_RGB8);

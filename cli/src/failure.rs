@@ -1,4 +1,4 @@
-//! Why the program ends early, and in which words.
+//! Why the program ends early, and the message it prints.
 
 use std::fmt;
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::remedy;
 use crate::stop;
 use crate::text::single_line;
 
-/// Shorthand for results of the program.
+/// A result of the program.
 pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
 
 /// Why the program ends early.
@@ -19,7 +19,7 @@ pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
 pub(crate) enum Failure {
     /// The command line makes no sense.
     Usage(String),
-    /// Something failed that the library has no error for, such as some pairs of a batch.
+    /// A failure without an error of the library, such as some failed pairs of a batch.
     Failed(String),
     /// The user stopped it.
     Stopped(String),
@@ -28,7 +28,7 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// A flag or argument that makes no sense, and why.
+    /// An error of the flag or argument `what`, with its reason.
     pub(crate) fn usage(what: impl fmt::Display, reason: impl fmt::Display) -> Self {
         Self::Usage(format!("{what}: {reason}"))
     }
@@ -52,7 +52,7 @@ impl Failure {
         }
     }
 
-    /// In one line, with what helps in these `words`.
+    /// The message in one line, with remedies in the vocabulary `words`.
     pub(crate) fn message(&self, words: &remedy::Vocabulary) -> String {
         match self {
             Self::Usage(text) | Self::Failed(text) | Self::Stopped(text) => single_line(text),
@@ -62,7 +62,7 @@ impl Failure {
 }
 
 impl fmt::Display for Failure {
-    /// One line, whatever the names of files hold.
+    /// One line, even if a file name contains line breaks.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(&self.message(&remedy::FLAGS))
     }
@@ -71,13 +71,13 @@ impl fmt::Display for Failure {
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         match error {
-            Error::Interrupted => Self::Stopped("stopped; nothing is left behind".into()),
+            Error::Interrupted => Self::Stopped("stopped; no output was left behind".into()),
             error => Self::Error(error),
         }
     }
 }
 
-/// An error of a value that the file `path` holds: it names the file, and `what` in it.
+/// Turns an error about a value into one about the file `path` that holds it; `what` names the entry.
 pub(crate) fn in_file(error: Error, path: &Path, what: &str) -> Error {
     match error {
         Error::Range(cause) => Error::read(path, format!("{what}{cause}")),
@@ -86,7 +86,7 @@ pub(crate) fn in_file(error: Error, path: &Path, what: &str) -> Error {
     }
 }
 
-/// An error of writing a file in the making that names `path`, where the user expects the file.
+/// Makes an error about a temporary file name the final `path`.
 pub(crate) fn at(error: Error, path: &Path) -> Error {
     match error {
         Error::Write { reason, .. } => Error::write(path, reason),

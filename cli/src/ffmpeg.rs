@@ -1,5 +1,4 @@
-//! Films in the formats that players know: ffmpeg, where it is installed, decodes and encodes them in a process of its own.
-//! Frames go between the two as YUV4MPEG2.
+//! Films in common formats. An installed ffmpeg decodes and encodes them in its own process; frames pass through pipes as YUV4MPEG2.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
@@ -12,14 +11,14 @@ use mrfgs::image::write;
 use mrfgs::{Error, Result};
 use tempfile::TempDir;
 
-/// Films that ffmpeg writes here: containers whose usual codec plays everywhere.
+/// Extensions that ffmpeg encodes: containers whose default codec plays everywhere.
 const WRITTEN: [&str; 6] = ["mp4", "m4v", "mkv", "mov", "webm", "avi"];
-/// Kinds of pixels that are read as they are; ffmpeg turns others into the nearest of them.
+/// Pixel formats read unchanged; ffmpeg converts all others to the nearest one.
 const READ: &str = "gray|gray12le|yuv420p|yuv422p|yuv444p|yuv420p10le|yuv422p10le|yuv444p10le|yuv420p12le|yuv422p12le|\
                     yuv444p12le";
-/// A tick for each frame: no frame is left out or repeated to keep a rate.
+/// Gives each frame one tick, so that ffmpeg neither drops nor repeats frames to keep a rate.
 const EVERY_FRAME: &str = "setpts=N/FRAME_RATE/TB";
-/// Players want even sizes.
+/// Pads to even sizes, which players require.
 const EVEN: &str = "pad=ceil(iw/2)*2:ceil(ih/2)*2";
 
 /// Whether ffmpeg can write a film of this name.
@@ -28,23 +27,23 @@ pub(crate) fn writes(path: &Path) -> bool {
     WRITTEN.contains(&extension.as_str())
 }
 
-/// Whether a file begins like a film that ffmpeg reads: MP4, Matroska, AVI and their kin.
+/// Whether a file starts like a film that ffmpeg reads: MP4, Matroska, AVI and relatives.
 pub(crate) fn reads(start: &[u8]) -> bool {
     let is_avi = start.starts_with(b"RIFF") && start.get(8..11).is_none_or(|kind| kind == b"AVI");
     is_avi || start.get(4..8) == Some(b"ftyp") || start.starts_with(b"\x1a\x45\xdf\xa3")
 }
 
-/// Finds out before any work whether ffmpeg is there to write `path`.
+/// Checks before any work that ffmpeg is installed to write `path`.
 ///
 /// # Errors
-/// [`Error::Write`] where it is not.
+/// [`Error::Write`] if it is not.
 pub(crate) fn check(path: &Path) -> Result<()> {
     let found =
         ffmpeg().arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
     found.map(drop).map_err(|e| Error::write(path, missing(&e, "encodes")))
 }
 
-/// The film in the file `path` as YUV4MPEG2.
+/// Decodes a film to YUV4MPEG2.
 pub(crate) struct Decoder {
     process: Process,
     frames: ChildStdout,
@@ -52,22 +51,22 @@ pub(crate) struct Decoder {
     complaint: Complaint,
 }
 
-/// The complaints of ffmpeg about a film that it decodes to its end.
+/// The last warning of ffmpeg about a film that it decoded to the end.
 #[derive(Clone, Default)]
 pub(crate) struct Complaint(Arc<OnceLock<String>>);
 
 impl Complaint {
-    /// In its words, where there is one.
+    /// The warning, if there is one.
     pub(crate) fn said(&self) -> Option<&str> {
         self.0.get().map(String::as_str).filter(|said| !said.is_empty())
     }
 }
 
 impl Decoder {
-    /// Begins to decode `path`.
+    /// Starts decoding `path`.
     ///
     /// # Errors
-    /// [`Error::Read`] where ffmpeg cannot be run.
+    /// [`Error::Read`] if ffmpeg cannot be run.
     pub(crate) fn new(path: &Path) -> Result<Self> {
         let mut command = ffmpeg();
         command.arg("-i").arg(file(path)).args([
@@ -83,7 +82,7 @@ impl Decoder {
         Ok(Self { process, frames, ended: false, complaint: Complaint::default() })
     }
 
-    /// The complaints of ffmpeg up to the end of the film.
+    /// A handle to the warning, which is set once the film has ended.
     pub(crate) fn complaint(&self) -> Complaint {
         self.complaint.clone()
     }
@@ -101,21 +100,21 @@ impl Read for Decoder {
     }
 }
 
-/// A film that ffmpeg encodes. It appears when it is [finished](Self::finish); dropped before, it leaves nothing.
+/// Encodes a film with ffmpeg. The file appears on [`finish`](Self::finish); dropped earlier, it leaves nothing.
 pub(crate) struct Encoder {
     path: PathBuf,
     process: Process,
     frames: Option<ChildStdin>,
-    /// Where it is made, and its name there.
+    /// The temporary folder of the film, and its path there.
     folder: TempDir,
     staged: PathBuf,
 }
 
 impl Encoder {
-    /// Begins the film `path`, whose frames are written as YUV4MPEG2.
+    /// Starts the film `path`, whose frames are written as YUV4MPEG2.
     ///
     /// # Errors
-    /// [`Error::Write`] where ffmpeg cannot be run, or the film cannot be made beside its place.
+    /// [`Error::Write`] if ffmpeg cannot be run, or the temporary folder cannot be created.
     pub(crate) fn new(path: &Path) -> Result<Self> {
         let beside = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
         let folder = tempfile::Builder::new().prefix(".mrfgs-").suffix(".tmp").tempdir_in(beside);
@@ -134,20 +133,20 @@ impl Encoder {
     /// Adds bytes of the stream.
     ///
     /// # Errors
-    /// [`Error::Write`] with what ffmpeg says where it has ended.
+    /// [`Error::Write`], with ffmpeg's message if it has exited.
     pub(crate) fn add(&mut self, bytes: &[u8]) -> Result<()> {
         let written = self.frames.as_mut().map_or(Ok(()), |frames| frames.write_all(bytes));
         written.map_err(|e| {
-            // It knows better why.
+            // ffmpeg's own message is more specific than "broken pipe".
             let cause = if e.kind() == ErrorKind::BrokenPipe { self.process.end().err() } else { None };
             Error::write(&self.path, cause.unwrap_or(e))
         })
     }
 
-    /// Ends the film, and gives it its name.
+    /// Ends the film and moves it to its place.
     ///
     /// # Errors
-    /// [`Error::Write`] where it cannot be written.
+    /// [`Error::Write`] if it cannot be written.
     pub(crate) fn finish(mut self) -> Result<()> {
         drop(self.frames.take());
         self.process.end().map_err(|e| Error::write(&self.path, e))?;
@@ -156,7 +155,7 @@ impl Encoder {
     }
 }
 
-/// ffmpeg at work, with what it says. It ends when this is dropped.
+/// A running ffmpeg and the thread that collects its messages. Dropping it ends the process.
 struct Process {
     child: Child,
     says: Option<JoinHandle<String>>,
@@ -169,10 +168,10 @@ impl Process {
         Ok(Self { child, says })
     }
 
-    /// Waits for its end. Returns what it says last.
+    /// Waits for the process to end and returns its last message.
     ///
     /// # Errors
-    /// The reason why ffmpeg failed.
+    /// ffmpeg's message or exit status if it failed.
     fn end(&mut self) -> io::Result<String> {
         let status = self.child.wait()?;
         let said = self.says.take().and_then(|says| says.join().ok()).unwrap_or_default();
@@ -189,40 +188,40 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It may have ended already.
+        // It may have exited already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// ffmpeg, which only says what fails, and asks nothing.
+/// The ffmpeg command, non-interactive and printing errors only.
 fn ffmpeg() -> Command {
     let mut command = Command::new("ffmpeg");
     command.args(["-nostdin", "-v", "error", "-y"]);
-    // Ctrl-C is for this program, which then ends the film.
+    // Keep Ctrl-C from ffmpeg; this program ends the film.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command
 }
 
-/// A path as ffmpeg takes it whatever its name holds: with a colon it could be an address.
+/// A path for ffmpeg; without the prefix, a name with a colon could be taken for a URL.
 fn file(path: &Path) -> std::ffi::OsString {
     let mut text = std::ffi::OsString::from("file:");
     text.push(path);
     text
 }
 
-/// Why ffmpeg cannot be run, which `does` something with films.
+/// The message when ffmpeg cannot be run; `does` is "encodes" or "decodes".
 fn missing(error: &io::Error, does: &str) -> String {
     match error.kind() {
         ErrorKind::NotFound => {
-            format!("ffmpeg {does} such films, and there is none on the PATH: install it, or use NAME.y4m")
+            format!("ffmpeg {does} this format but is not on the PATH; install it, or use NAME.y4m")
         }
-        _ => format!("ffmpeg, which {does} such films, cannot be run: {}", in_words(error)),
+        _ => format!("ffmpeg, which {does} this format, cannot be run: {}", in_words(error)),
     }
 }
 
-/// The last line that ffmpeg says, which names the cause.
+/// The last line that ffmpeg prints, which names the cause.
 fn last_line(stderr: ChildStderr) -> String {
     let mut said = String::new();
     for line in io::BufRead::lines(io::BufReader::new(stderr)).map_while(io::Result::ok) {

@@ -1,5 +1,5 @@
-//! The command line of mrfgs. Files import from the layers below them alone: text and console, then arguments, outputs, pairs
-//! of images, the running of a match, and on top the commands.
+//! The command line of mrfgs. Imports lead down: text and console, arguments, outputs, image pairs, running a match, and on top the
+//! commands.
 
 #![forbid(unsafe_code)]
 
@@ -34,31 +34,32 @@ use failure::Failure;
 pub use pairs::list;
 
 const ABOUT: &str = "\
-Stereo disparity by a multi-resolution factor graph, with the same bits on every device.
+Turns two photos of a scene into a disparity or depth map, the same on every GPU and CPU.
 
-Takes a rectified pair and writes how far each pixel of the left image has moved to the left in the right one: \
-left (x, y) with disparity d is seen at right (x - d, y).";
+Disparity says how far each pixel of the left image moves to the left in the right image: \
+left (x, y) with disparity d appears at right (x - d, y). Near objects move farther.";
 
 const EXAMPLES: &str = "\
 Examples:
-  mrfgs demo                                  # a first map
+  mrfgs demo                                  # try it on a built-in pair
+  mrfgs match left.jpg right.jpg disparity.png --rectify    # two hand-held photos
   mrfgs match left.png right.png disparity.pfm --max-disparity 63
   mrfgs match im0.png im1.png disparity.png   # range: calib.txt beside im0.png
   mrfgs rectify left.png right.png rectified --calib stereo.yml
-  mrfgs batch pairs.csv maps                  # many pairs; again, it resumes
+  mrfgs batch pairs.csv maps                  # many pairs; run it again to resume
   mrfgs sequence left right maps              # the frames of a video
-  mrfgs ros --method fast --also points       # two cameras of ROS 2, live
+  mrfgs ros --method fast --also points       # live from two ROS 2 cameras
   mrfgs evaluate Teddy Cones --json figures.json
   mrfgs presets paper > paper.toml
 
-Exit status: 0 when all went well, 2 when the command line makes no sense (for this pair, or on this machine), 130 when \
-stopped by Ctrl-C or another signal that ends programs, 1 for any other failure. A failure is one line on standard error and leaves no output behind.";
+Exit status: 0 on success, 2 if the command line is wrong (also for this pair or this machine), 130 if \
+stopped by Ctrl-C or another signal, 1 for any other failure. A failure prints one line on standard error and leaves no output behind.";
 
 #[derive(Parser)]
 #[command(name = "mrfgs", version, about = ABOUT, after_help = EXAMPLES, max_term_width = 100)]
 #[command(disable_version_flag = true)]
 struct Cli {
-    /// Print the versions of mrfgs, of wgpu and of every driver
+    /// Print the versions of mrfgs, wgpu and every driver
     #[arg(short = 'V', long, action = ArgAction::Version)]
     version: (),
     #[command(subcommand)]
@@ -77,21 +78,21 @@ enum Command {
     Evaluate(evaluate::Args),
     Bench(bench::Args),
     Inspect(inspect::Args),
-    /// List the devices of this machine, their limits, and which one `auto` takes
+    /// List the devices of this machine, their limits, and the one that `auto` uses
     Devices,
     Presets(presets::Args),
     Completions(completions::Args),
     Man(man::Args),
 }
 
-/// Does what the command line says; the exit status of the program.
+/// Runs the program and returns its exit status.
 #[must_use]
 pub fn main() -> ExitCode {
     process::tell_panics_in_one_line();
     stop::tell_of_full_files();
     match panic::catch_unwind(run) {
         Ok(Ok(())) => ExitCode::SUCCESS,
-        // The hook has told about it.
+        // The panic hook has already printed a message.
         Err(_) => ExitCode::FAILURE,
         Ok(Err(failure)) => {
             console::say(&failure.to_string());
@@ -126,14 +127,14 @@ fn run() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The parser's complaint without its headings and the usage.
+/// The parser's error in one line, without headings and usage.
 fn one_line(error: &clap::Error) -> String {
     let program = Cli::command();
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         let names: Vec<_> = program.get_subcommands().map(clap::Command::get_name).collect();
         let (last, others) = names.split_last().unwrap_or((&"", &[]));
         return format!(
-            "give a subcommand: {} or {last}; `mrfgs --help` explains, `mrfgs demo` shows",
+            "give a command: {} or {last}; see `mrfgs --help`, or try `mrfgs demo`",
             others.join(", ")
         );
     }
@@ -151,7 +152,7 @@ fn one_line(error: &clap::Error) -> String {
         called = format!("{called} {}", below.get_name());
         command = below;
     }
-    format!("{}; `{called} --help` explains", text.strip_prefix("error: ").unwrap_or(&text))
+    format!("{}; see `{called} --help`", text.strip_prefix("error: ").unwrap_or(&text))
 }
 
 #[cfg(test)]
@@ -163,14 +164,14 @@ mod tests {
         Cli::command().debug_assert();
     }
 
-    /// The reason why the parser refuses an example, if it does.
+    /// The parser's error for an example, if there is one.
     fn fault(line: &str) -> Option<String> {
         let line = ["  #", " | ", " > ", " && "]
             .iter()
             .fold(line, |line, end| line.split(end).next().unwrap_or(line));
         let answer =
             Cli::try_parse_from(line.split_whitespace().map(|word| word.trim_matches(['\'', '"']))).err()?;
-        // Prose calls a command without what it takes.
+        // Prose may name a command without its arguments.
         let is_short = matches!(
             answer.kind(),
             ErrorKind::DisplayHelp
@@ -181,7 +182,7 @@ mod tests {
         (!is_short).then(|| format!("{line}: {}", one_line(&answer)))
     }
 
-    /// Every command line that the help and the documents show is one.
+    /// Every command line in the help and the documents parses.
     #[test]
     fn examples_are_command_lines() {
         fn texts(command: &clap::Command) -> Vec<String> {
@@ -189,7 +190,7 @@ mod tests {
                 .map(|text| text.map(ToString::to_string));
             help.into_iter().flatten().chain(command.get_subcommands().flat_map(texts)).collect()
         }
-        // A plug-in's line, and those that stand for words.
+        // The line of a plug-in, and lines with placeholders.
         let no_lines = ["mrfgs /path/to/asp-plugin", "mrfgs --threads", "mrfgs evaluate map --json"];
         let of_help = texts(&Cli::command());
         let mut lines: Vec<String> = of_help
@@ -214,7 +215,7 @@ mod tests {
         assert!(fault("mrfgs frobnicate").is_some());
     }
 
-    /// The flags that a command may have, --help apart.
+    /// Caps the number of flags of each command, not counting --help.
     #[test]
     fn commands_have_few_flags() {
         let caps = [

@@ -1,4 +1,4 @@
-//! Running a match with a progress bar and a line about it.
+//! Running a match, with a progress bar and a summary line.
 
 use std::time::{Duration, Instant};
 
@@ -13,24 +13,24 @@ use crate::progress::Bar;
 use crate::remedy;
 use crate::text::plural;
 
-/// The disparities that a match searches, and where.
+/// The disparities and the region that a match searches.
 #[derive(Clone, Copy)]
-pub(crate) struct Searched<'a> {
+pub(crate) struct SearchSpace<'a> {
     range: DisparityRange,
-    /// Whether it may become [wider](check::wider).
+    /// Whether a full range is widened (see [`check::wider`]).
     pub(crate) may_widen: bool,
-    /// The region of the left view, where it is not all.
+    /// The region of the left view; `None` for all of it.
     region: Option<&'a Rect>,
 }
 
-impl From<DisparityRange> for Searched<'_> {
+impl From<DisparityRange> for SearchSpace<'_> {
     fn from(range: DisparityRange) -> Self {
         Self { range, may_widen: false, region: None }
     }
 }
 
-impl<'a> Searched<'a> {
-    /// `range`, which may become wider where sparse matches found it and the wider one `fits` the outputs.
+impl<'a> SearchSpace<'a> {
+    /// Searches `range`. If sparse matches gave it and the wider one `fits` the outputs, it may be widened.
     pub(crate) fn new(
         range: DisparityRange,
         by_matches: bool,
@@ -39,12 +39,12 @@ impl<'a> Searched<'a> {
         Self { range, may_widen: by_matches && check::beyond(range).is_some_and(fits), region: None }
     }
 
-    /// In this region alone, where there is one.
+    /// Restricts the search to `region`, if given.
     pub(crate) fn in_region(self, region: Option<&'a Rect>) -> Self {
         Self { region, ..self }
     }
 
-    /// A match of `pair` over it.
+    /// A match of `pair` over this search space.
     pub(crate) fn job<'b>(self, matcher: &'b mut Matcher, pair: &'b Pair) -> Job<'b> {
         let job = if self.may_widen {
             matcher.job(pair, AutoRange(self.range))
@@ -58,12 +58,12 @@ impl<'a> Searched<'a> {
     }
 }
 
-/// Matches a pair with a progress bar, unless the user [stops](crate::stop) it, and says on standard error what ran where and how
-/// long. `name` tells pairs apart where there are several.
+/// Matches a pair with a progress bar, unless the user [stops](crate::stop) it, and prints device and time to standard error. `name`
+/// identifies the pair if there are several.
 pub(crate) fn run(
     matcher: &mut Matcher,
     pair: &Pair,
-    searched: Searched,
+    searched: SearchSpace,
     method: &Method,
     name: Option<&str>,
     quiet: bool,

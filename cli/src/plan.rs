@@ -10,7 +10,7 @@ use crate::failure::Result;
 use crate::table::Table;
 use crate::text::{bytes, plural};
 
-/// The plan in words and tables, with that for twice the size, if there is one.
+/// Describes the plan, followed by that of the second pass at twice the size, if there is one.
 pub(crate) fn describe(plan: &Plan) -> Result<String> {
     let own = at_one_size(&Tiles::new(plan)?);
     let Some(double) = plan.doubled()? else { return Ok(own) };
@@ -63,7 +63,7 @@ fn memory(tiles: &Tiles, plan: &Plan) -> Table {
     table
 }
 
-/// The messages and when they are exchanged.
+/// The messages and their schedule.
 fn schedule(plan: &Plan) -> Table {
     let mut table = Table::new("l|l");
     let width = 8 * plan.volume_width.bytes();

@@ -1,4 +1,4 @@
-//! This process: what it has used of its machine, how it tells of its own defects, and its environment.
+//! This process: its resource usage, its environment and how it reports panics.
 
 use std::io::Write;
 use std::time::Duration;
@@ -8,8 +8,8 @@ use mrfgs::image::read;
 
 use crate::text::single_line;
 
-/// From now on a panic is one line on standard error, and none where an image is decoded, as that becomes an error of the file.
-/// With `RUST_BACKTRACE` it is what it always is.
+/// Makes a panic print one line to standard error; panics of image decoders print nothing, as they become read errors. With
+/// `RUST_BACKTRACE`, panics are reported as usual.
 pub(crate) fn tell_panics_in_one_line() {
     if env::var_os("RUST_BACKTRACE").is_some_and(|value| value != "0") {
         return;
@@ -23,13 +23,13 @@ pub(crate) fn tell_panics_in_one_line() {
         let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic");
         let place =
             panic.location().map(|place| format!(" ({}:{})", place.file(), place.line())).unwrap_or_default();
-        let text = single_line(&format!("this is a defect of mrfgs, please report it: {text}{place}"));
+        let text = single_line(&format!("this is a bug in mrfgs, please report it: {text}{place}"));
         let _ = writeln!(io::stderr(), "mrfgs: {text}");
     }));
 }
 
-/// Keeps the loader of Vulkan from printing to standard error that `XDG_RUNTIME_DIR` is missing, as it does on machines without a
-/// display: starts the program anew with that set, as no other way to set it is safe.
+/// Restarts the program with `XDG_RUNTIME_DIR` set, as the Vulkan loader complains on standard error without it (machines without a
+/// display). Setting the variable in a running process would not be thread-safe.
 #[cfg(target_os = "linux")]
 pub(crate) fn quiet_loader() {
     use std::os::unix::process::CommandExt;
@@ -42,26 +42,26 @@ pub(crate) fn quiet_loader() {
     if let Some(name) = args.next() {
         command.arg0(name);
     }
-    // A folder that nobody else can put a socket into. It returns where it fails, and then there is a line too many.
+    // No one else can put a socket into `/`. If `exec` fails it returns, and the loader prints its line.
     let _ = command.args(args).env("XDG_RUNTIME_DIR", "/").exec();
 }
 
 #[cfg(not(target_os = "linux"))]
 pub(crate) fn quiet_loader() {}
 
-/// The time that all processors together have spent on this process.
+/// The CPU time of this process, summed over all processors.
 #[cfg(unix)]
 pub(crate) fn processor_time() -> Option<Duration> {
     Duration::try_from(rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime)).ok()
 }
 
-/// The time that all processors together have spent on this process.
+/// The CPU time of this process, summed over all processors.
 #[cfg(not(unix))]
 pub(crate) fn processor_time() -> Option<Duration> {
     None
 }
 
-/// The most memory that this process has held so far, in bytes.
+/// The peak memory of this process, in bytes.
 pub(crate) fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,5 +1,5 @@
-//! The bars that show how far a match is, how far a batch, and how far a sequence. On a terminal they are drawn from [`PATIENCE`]
-//! or the first item on, elsewhere they hide themselves, and what takes long tells a log now and then.
+//! Progress bars of a match, a batch and a sequence. A terminal shows them after [`PATIENCE`] or the first item; a log gets a line from
+//! time to time.
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -11,13 +11,13 @@ use mrfgs::Progress;
 use crate::console;
 use crate::stop;
 
-/// What is over sooner than this needs no bar.
+/// Work shorter than this shows no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
 const STEPS: u64 = 1000;
-/// How often a log is told.
+/// Interval between lines in a log.
 const SILENCE: Duration = Duration::from_secs(30);
 
-/// A bar of `length` steps where it is known, else a spinner. It goes when it is dropped.
+/// A bar of `length` steps, or a spinner if the length is unknown. It disappears when dropped.
 fn bar(length: Option<usize>, template: &str, quiet: bool) -> ProgressBar {
     let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
@@ -25,7 +25,7 @@ fn bar(length: Option<usize>, template: &str, quiet: bool) -> ProgressBar {
     bar.with_style(style).with_finish(ProgressFinish::AndClear)
 }
 
-/// How far a match is.
+/// The progress of a match.
 pub(crate) struct Bar(ProgressBar);
 
 impl Bar {
@@ -34,7 +34,7 @@ impl Bar {
         Self(bar.with_prefix(name.unwrap_or("mrfgs").to_owned()))
     }
 
-    /// Shows how far it is, and says whether to go on.
+    /// Updates the bar, and tells the matcher whether to go on.
     pub(crate) fn update(&mut self, progress: Progress) -> ControlFlow<()> {
         if self.0.elapsed() > PATIENCE {
             self.0.set_message(match progress.tile {
@@ -47,59 +47,59 @@ impl Bar {
     }
 }
 
-/// How many pairs of a batch or frames of a sequence are done.
+/// The number of finished pairs of a batch or frames of a sequence.
 pub(crate) struct Counter {
     bar: ProgressBar,
     log: Log,
 }
 
 impl Counter {
-    /// For so many pairs, of which some are done.
+    /// A counter of `pairs`, of which `done` are already finished.
     pub(crate) fn of_pairs(pairs: usize, done: usize, quiet: bool) -> Self {
         let bar = bar(Some(pairs), "mrfgs [{bar:40}] {pos} of {len} {msg}", quiet);
         bar.set_position(done as u64);
         Self { bar, log: Log::new(quiet) }
     }
 
-    /// For `all` frames, where their number is known.
+    /// A counter of frames; `all` is their number, if known.
     pub(crate) fn of_frames(all: Option<usize>, quiet: bool) -> Self {
         Self { bar: bar(all, "mrfgs {spinner} {msg}", quiet), log: Log::new(quiet) }
     }
 
-    /// Shows the pair at work.
+    /// Shows the pair being matched.
     pub(crate) fn begin_pair(&mut self, name: &str) {
         self.bar.set_message(name.to_owned());
         self.log.tell(|| line(&self.bar, name));
     }
 
-    /// Counts a pair that is done or has failed.
+    /// Counts a pair as finished or failed.
     pub(crate) fn end_pair(&self) {
         self.bar.inc(1);
     }
 
-    /// Counts a frame that is done.
+    /// Counts a frame as finished.
     pub(crate) fn end_frame(&mut self) {
         self.bar.inc(1);
         let frames = self.bar.position();
         let rate = frames as f64 / self.bar.elapsed().as_secs_f64();
         let of = self.bar.length().map(|all| format!(" of {all}")).unwrap_or_default();
-        let line = format!("{frames}{of} frames, {rate:.1} a second");
+        let line = format!("{frames}{of} frames, {rate:.1} per second");
         self.bar.set_message(line.clone());
         self.log.tell(|| line);
     }
 
-    /// Lets `say` write to standard error past the bar.
+    /// Runs `say`, which prints to standard error, with the bar hidden.
     pub(crate) fn past(&self, say: impl FnOnce()) {
         self.bar.suspend(say);
     }
 }
 
-/// How far a batch is, for a log.
+/// The line about a batch for a log.
 fn line(bar: &ProgressBar, name: &str) -> String {
     format!("{} of {} pairs, now {name}", bar.position(), bar.length().unwrap_or_default())
 }
 
-/// When a log was last told; `None` where nothing is to be.
+/// The time of the last line in the log; `None` without a log.
 struct Log(Option<Instant>);
 
 impl Log {

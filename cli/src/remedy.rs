@@ -1,8 +1,8 @@
-//! The program's words for what helps: flags, and the columns of a list.
+//! The remedies in messages: flags of the command line, and columns of a list.
 
 pub(crate) use mrfgs::remedy::{Vocabulary, doubt, error, of_rectified, warning};
 
-/// On the command line.
+/// Words for flags of the command line.
 pub(crate) const FLAGS: Vocabulary = Vocabulary {
     key: ["--set ", ""],
     keys: Some("`mrfgs presets` lists the keys"),
@@ -28,11 +28,11 @@ pub(crate) const FLAGS: Vocabulary = Vocabulary {
     ..Vocabulary::PLAIN
 };
 
-/// Of cameras that the command line gives by their numbers.
+/// Words for cameras given as numbers on the command line.
 pub(crate) const NUMBERS: Vocabulary =
     Vocabulary { unit: Some("give the right one with the number, such as 120mm, 12cm or 0.12m"), ..FLAGS };
 
-/// In a list of pairs, where --rectify takes a calibration.
+/// Words for a list of pairs, where --rectify needs a calibration.
 pub(crate) const COLUMNS: Vocabulary =
     Vocabulary { min: "min_disparity", max: "max_disparity", rectify: Some("`mrfgs rectify`"), ..FLAGS };
 
@@ -47,7 +47,7 @@ mod tests {
 
     use super::*;
 
-    /// Every cause, and the words with which it is told, in their order.
+    /// Every cause, with the words that its message must contain in order.
     fn every() -> Vec<(Error, &'static str)> {
         let name = || "a device".to_owned();
         let option = |key: &str, cause| Error::option(key, cause);
@@ -157,7 +157,7 @@ mod tests {
 
     const ROWS: Part = Part::Rows { first: 90, last: 179, of: 180 };
 
-    /// Every warning, and what is said of it.
+    /// Every warning, with the words that its message must contain in order.
     const WARNINGS: [(Warning, &str); 16] = [
         (Warning::Oriented { which: 2 }, "both images ... turn them upright by --orient"),
         (Warning::Identical, "give the right view"),
@@ -180,8 +180,7 @@ mod tests {
         (Warning::Clipped { end: -5, upper: false, percent: 9 }, ": lower --min-disparity"),
     ];
 
-    /// Whoever meets one of these reads what is wrong, the flag and the remedy, in one line. A user of the library knows no flags,
-    /// and no program.
+    /// Each message names the problem, the flag and the remedy in one line. Messages of the library name neither flags nor the program.
     #[test]
     fn every_cause_has_a_remedy() {
         let errors =
@@ -201,7 +200,7 @@ mod tests {
     #[test]
     fn a_list_has_columns_and_no_flags() {
         let ranges = every().into_iter().filter(|(cause, _)| matches!(cause, Error::Range(_)));
-        // Where the pair itself is to be mended, no range helps.
+        // If the pair itself is at fault, no range helps.
         let ranges = ranges
             .filter(|(cause, _)| !matches!(cause, Error::Range(RangeError::NotFound { cause: Some(_) })));
         let errors = ranges.map(|(cause, _)| error(&cause, &COLUMNS));

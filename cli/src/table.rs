@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// A table whose columns are as wide as their widest cell, in groups with a `|` between them.
+/// A table whose columns fit their widest cell, in groups separated by `|`.
 pub(crate) struct Table {
     /// The alignment of each column, by group: `l` or `r`.
     groups: Vec<Vec<char>>,
@@ -10,39 +10,35 @@ pub(crate) struct Table {
 }
 
 enum Line {
-    /// A cell for each column; those that are missing at the end are empty.
+    /// A cell per column; missing cells at the end are empty.
     Row(Vec<String>),
-    /// A title for each group, centred over its columns.
+    /// A title per group, centred over its columns.
     Titles(Vec<String>),
     /// A rule across the table.
     Rule,
-    /// A line of its own.
+    /// Free text.
     Text(String),
 }
 
 impl Table {
-    /// An empty table. `columns` has an `l` or an `r` for each column, aligned left or right, and a `|` between groups.
+    /// An empty table. `columns` has an `l` or `r` per column, for left or right alignment, and a `|` between groups.
     pub(crate) fn new(columns: &str) -> Self {
         let groups = columns.split('|').map(|group| group.chars().collect());
         Self { groups: groups.collect(), lines: Vec::new() }
     }
 
-    /// Adds a row.
     pub(crate) fn row(&mut self, cells: impl IntoIterator<Item = impl Into<String>>) {
         self.lines.push(Line::Row(cells.into_iter().map(Into::into).collect()));
     }
 
-    /// Adds a row with a title for each group of columns.
     pub(crate) fn titles(&mut self, titles: impl IntoIterator<Item = impl Into<String>>) {
         self.lines.push(Line::Titles(titles.into_iter().map(Into::into).collect()));
     }
 
-    /// Adds a rule.
     pub(crate) fn rule(&mut self) {
         self.lines.push(Line::Rule);
     }
 
-    /// Adds lines of text that are in no column.
     pub(crate) fn text(&mut self, text: impl Into<String>) {
         self.lines.push(Line::Text(text.into()));
     }
@@ -71,7 +67,7 @@ impl Table {
     }
 }
 
-/// The width of a group of columns, which are a space apart.
+/// The width of a group of columns, with a space between columns.
 fn whole(group: &[usize]) -> usize {
     group.iter().sum::<usize>() + group.len().saturating_sub(1)
 }

@@ -1,16 +1,16 @@
-//! Small pieces of text.
+//! Formatting of short texts.
 
-/// The lines of a text, joined into one.
+/// Joins the lines of a text into one.
 pub(crate) fn single_line(text: &str) -> String {
     text.lines().map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// The ending of a noun after `count`.
+/// The plural ending of a noun after `count`.
 pub(crate) fn plural(count: usize) -> &'static str {
     if count == 1 { "" } else { "s" }
 }
 
-/// A figure with so many decimals, or a dash where there is none.
+/// A number with this many decimals, or a dash for `None`.
 pub(crate) fn figure(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".into(), |v| format!("{v:.decimals$}"))
 }
@@ -30,7 +30,7 @@ pub(crate) fn bytes(count: u64) -> String {
     format!("{value:.*} {}", usize::from(value < 9.95), UNITS[unit])
 }
 
-/// A text in lines of at most `width` columns, each behind `lead`.
+/// Wraps a text at `width` columns, each line starting with `lead`.
 pub(crate) fn wrapped(text: &str, width: usize, lead: &str) -> String {
     let mut lines = vec![lead.to_owned()];
     for word in text.split(' ') {

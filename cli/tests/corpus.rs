@@ -1,4 +1,4 @@
-//! Replays the corpus of the fuzz targets: every file through the function that its target runs.
+//! Replays the fuzzing corpus: every file goes through the function that its target runs.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -8,10 +8,10 @@ mod targets;
 
 use std::path::{Path, PathBuf};
 
-/// What a target does with an input.
+/// The function under test.
 type Target = fn(&[u8]);
 
-/// Every target with its name, which is that of its folder.
+/// Every target, named after its folder.
 const TARGETS: [(&str, Target); 7] = [
     ("pfm", targets::pfm),
     ("calib", targets::calib),
@@ -22,7 +22,7 @@ const TARGETS: [(&str, Target); 7] = [
     ("config", targets::config),
 ];
 
-/// The files of a target.
+/// The files of a target's corpus.
 fn corpus(target: &str) -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target);
     glob::glob(folder.join("*").to_str().unwrap()).unwrap().map(Result::unwrap).collect()
@@ -34,28 +34,28 @@ fn every_file_is_read_or_refused() {
         let files = corpus(name);
         assert!(files.len() >= 5, "{name} has {} files", files.len());
         for file in files {
-            // What fails names the input.
+            // Name the input in case it fails.
             println!("{}", file.display());
             target(&std::fs::read(file).unwrap());
         }
     }
 }
 
-/// Control: a refusal that fills a screen is noticed.
+/// Control: an error of two lines is noticed.
 #[test]
 #[should_panic(expected = "second line")]
-fn a_refusal_of_two_lines_is_noticed() {
+fn an_error_of_two_lines_is_noticed() {
     targets::told::<()>(Err(mrfgs::Error::Mismatch("the first\nand the second line".into())));
 }
 
-/// All of it within a fraction of what the files claim: no allocation larger than that can be had, touched or not.
+/// Replays the corpus with little memory: allocations of the size that the files claim would fail, touched or not.
 #[cfg(target_os = "linux")]
 mod memory {
     use std::process::{Command, Output};
 
-    /// For the replay beside the program itself and its threads.
+    /// For the replay, the program and its threads.
     const KIB: u32 = 512 << 10;
-    /// Says to the test below that it runs under the limit.
+    /// Tells the test below that it runs under the limit.
     const LIMITED: &str = "MRFGS_TEST_LIMITED";
 
     fn limited(test: &str) -> Output {
@@ -69,13 +69,13 @@ mod memory {
     }
 
     #[test]
-    fn every_file_is_content_with_little() {
+    fn every_file_needs_little_memory() {
         let output = limited("every_file_is_read_or_refused");
         assert!(output.status.success(), "{output:?}");
         assert!(String::from_utf8_lossy(&output.stdout).contains("1 passed"), "{output:?}");
     }
 
-    /// Control: more cannot be had.
+    /// Control: a larger allocation fails.
     #[test]
     fn the_limit_holds() {
         if std::env::var_os(LIMITED).is_some() {

@@ -1,7 +1,6 @@
-//! What the fuzz targets do with an input, which is the content of a file. `cli/tests/corpus.rs` replays the corpus through the
-//! same functions.
+//! The functions of the fuzz targets; the input is the content of a file. `cli/tests/corpus.rs` replays the corpus through them.
 //!
-//! A file is read or refused: a refusal is one line that fits a screen, and what is read keeps its promises.
+//! A file is either read, with all invariants, or refused with one line that fits a screen.
 
 use mrfgs::calibration;
 use mrfgs::image::calib::Calibration;
@@ -18,7 +17,7 @@ use std::collections::HashSet;
 use std::io::Write;
 use std::path::Path;
 
-/// Pixels of an image at most: few, so that an input takes little time.
+/// Maximum number of pixels of an image, small to keep inputs fast.
 pub const MAX_PIXELS: u64 = 1 << 16;
 
 /// A PFM file.
@@ -54,7 +53,7 @@ pub fn calib(bytes: &[u8]) {
     });
 }
 
-/// A recording: all its topics and messages, and what they hold if they are images or cameras.
+/// A recording: all topics and messages, decoded as images and cameras.
 pub fn recording(bytes: &[u8]) {
     with_file(bytes, |path| {
         if !Recording::is(path) {
@@ -109,7 +108,7 @@ pub fn cameras(bytes: &[u8]) {
     }
 }
 
-/// An image of any kind: as both views and the mask of a pair, as levels, and as a map of disparities.
+/// An image of any kind: as both views and mask of a pair, as grey levels, and as a disparity map.
 pub fn image(bytes: &[u8]) {
     with_file(bytes, |path| {
         let reader = Reader { max_pixels: MAX_PIXELS, ..Reader::default() };
@@ -150,7 +149,7 @@ pub fn list(bytes: &[u8]) {
     });
 }
 
-/// A method in TOML; also the value of a key on the command line.
+/// A method in TOML, and the value of a key on the command line.
 pub fn config(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
     for preset in PRESETS {
@@ -174,7 +173,7 @@ pub fn config(bytes: &[u8]) {
     }
 }
 
-/// Does `f` with a file that holds `bytes`.
+/// Runs `f` with a file that contains `bytes`.
 fn with_file<T>(bytes: &[u8], f: impl FnOnce(&Path) -> T) -> T {
     let memory = Path::new("/dev/shm");
     let folder = if memory.is_dir() { memory.into() } else { std::env::temp_dir() };
@@ -183,7 +182,7 @@ fn with_file<T>(bytes: &[u8], f: impl FnOnce(&Path) -> T) -> T {
     f(file.path())
 }
 
-/// What was read; else the refusal is one line that can be shown.
+/// The value, or `None` for an error, which must be one printable line.
 pub fn told<T>(result: Result<T>) -> Option<T> {
     let refused = |error: Error| {
         let text = error.to_string();

@@ -1,4 +1,4 @@
-# Tools that run this file need what comes first.
+# `from __future__` must come first; some tools execute this file.
 from __future__ import annotations
 
 import os
@@ -30,19 +30,19 @@ __all__ = [
 
 __version__: str
 
-# Whatever numpy makes an array of, or what has __dlpack__: uint8, uint16, float16, float32, float64, or other whole numbers with the values of the first two; of shape
-# (height, width) or (height, width, channels).
+# Anything that numpy or __dlpack__ turns into an array of uint8, uint16, float16, float32, float64, or of other integers with values of the
+# first two, of shape (height, width) or (height, width, channels).
 _Image = npt.ArrayLike
 
 # The path of a file.
 _Path = str | os.PathLike[str]
 
 class MatchWarning(UserWarning):
-    """What is probably wrong with a pair, or with the range of disparities that was searched, and what to do about it."""
+    """A probable fault of a pair or of the disparity range, and its remedy."""
 
 @final
 class Matched:
-    """The maps of a pair, and what made them. All maps have the shape (height, width) of the images."""
+    """The maps of a pair, of shape (height, width), and how they were computed."""
 
     def __new__(
         cls,
@@ -61,27 +61,26 @@ class Matched:
     ) -> Matched: ...
     @property
     def disparity(self) -> npt.NDArray[np.float32]:
-        """Disparity in pixels, +inf where there is none."""
+        """Disparity in pixels, +inf if unknown."""
     @property
     def raw(self) -> npt.NDArray[np.float32]:
         """Disparity before post-processing in pixels, +inf where the left image is masked."""
     @property
     def confidence(self) -> npt.NDArray[np.uint8]:
-        """How far the best runner-up is behind, in 1/8 nat, as a mean over the pixels around; those with another disparity count 0. It
-        is 0 where there is no measurement."""
+        """How sure each pixel is: the lead of the best disparity over the runner-up in 1/8 nat, averaged over neighbouring pixels (those
+        with another disparity count 0). 0 for pixels without a measurement."""
     @property
     def sigma(self) -> npt.NDArray[np.float32]:
-        """The error to expect of every measured disparity in pixels, from its confidence: about two thirds are nearer to the truth.
-        +inf where nothing was measured."""
+        """The expected error of every measured disparity in pixels, from its confidence: about two thirds of the errors are smaller. +inf
+        for pixels without a measurement."""
     @property
     def validity(self) -> npt.NDArray[np.uint8]:
-        """Why each pixel is what it is: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
-        confidence, 16 filled, 32 masked, 64 a tie of two disparities, 128 outvoted by the pixels around it; 0 is measured
-        and trusted."""
+        """The status of each pixel: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low confidence, 16
+        filled, 32 masked, 64 a tie of two disparities, 128 outvoted by neighbouring pixels; 0 is measured and trusted."""
     @property
     def right(self) -> npt.NDArray[np.float32] | None:
-        """Disparity of the right view in pixels, +inf where there is none: right (x, y) with disparity d is seen at left
-        (x + d, y). None unless the option "right-map" asks for it."""
+        """Disparity of the right view in pixels, +inf if unknown: right (x, y) with disparity d appears at left (x + d, y). None without
+        the option "right-map"."""
     @property
     def min_disparity(self) -> int:
         """Smallest disparity that was searched, in pixels."""
@@ -90,20 +89,20 @@ class Matched:
         """Largest disparity that was searched, in pixels."""
     @property
     def iterations(self) -> int:
-        """Iterations done, of all phases together."""
+        """Number of iterations, over all phases."""
     @property
     def tiles(self) -> int:
-        """Tiles that the image was matched in."""
+        """Number of tiles that the image was split into."""
     @property
     def ran_on(self) -> str:
-        """What ran it."""
+        """The device."""
     @property
     def note(self) -> str | None:
-        """Why that is not the device that was hoped for, where that is so."""
+        """Why the preferred device was not used, else None."""
 
 @final
 class Matcher:
-    """Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between."""
+    """Matches pairs, keeping the device, its compiled shaders and its buffers in between."""
 
     def __new__(cls, *, device: str | int | None = None, threads: int | None = None) -> Matcher: ...
     def match(
@@ -134,8 +133,8 @@ class Matcher:
         memory: str | None = None,
         warn: bool = True,
     ) -> MatchedSequence:
-        """Matches pair after pair, and returns an iterator over their results, in order. At most three pairs are taken ahead of the
-        results; an exception of `pairs` comes after the results of the pairs before it."""
+        """Matches pair after pair, and returns an iterator over their results, in order. At most three pairs are consumed ahead of the
+        results; an exception from `pairs` comes after the results of earlier pairs."""
 
 @final
 class MatchedSequence(Iterator[Matched]):
@@ -143,11 +142,11 @@ class MatchedSequence(Iterator[Matched]):
 
     def __next__(self) -> Matched: ...
     def close(self) -> None:
-        """Ends the sequence: stops the match that runs, takes no more pairs, and gives the matcher back."""
+        """Ends the sequence: stops the running match, consumes no more pairs, and releases the matcher."""
 
 @final
 class Calibration:
-    """What is known of a pair of cameras, read from the files of OpenCV, ROS, Kalibr or Middlebury."""
+    """The calibration of a pair of cameras, read from files of OpenCV, ROS, Kalibr, Middlebury and others."""
 
     def __new__(
         cls, *files: _Path, unit: str | None = None, crop: tuple[int, int, int, int] | None = None
@@ -156,23 +155,23 @@ class Calibration:
     def of_texts(
         *texts: str, unit: str | None = None, crop: tuple[int, int, int, int] | None = None
     ) -> Calibration:
-        """The same of the texts of such files: one, or two that belong together."""
+        """Reads a calibration from the texts of such files: one, or two that belong together."""
     @property
     def size(self) -> tuple[int, int] | None:
-        """(width, height) of the images as the cameras took them; None where the files do not say it."""
+        """(width, height) of the raw images; None if the files lack it."""
     @property
     def unit(self) -> str:
         """The unit of the baseline: "mm", "cm", "m", or "unknown"."""
     @property
     def max_disparity(self) -> int | None:
-        """The largest disparity of the pair, in pixels, from the line ndisp of a calib.txt; else None."""
+        """The largest disparity of the pair, in pixels, from ndisp in a calib.txt, else None."""
 
-# A calibration, the path of its file, or those of two files that belong together.
+# A calibration, the path of its file, or two paths that belong together.
 _Cameras = Calibration | _Path | Iterable[_Path]
 
 @final
 class Rectification:
-    """How images as the cameras took them become a rectified pair. It is found once, and applied to any number of pairs."""
+    """Turns raw images into rectified pairs. It is computed once and applies to any number of pairs."""
 
     def __new__(
         cls,
@@ -192,8 +191,8 @@ class Rectification:
         alpha: float | None = None,
         zero_disparity: bool = True,
     ) -> Rectification:
-        """The rectification of a pair by matches of its own, without a calibration: of two photographs of one camera that was moved to
-        the side by hand. `trust` says how far it can be trusted; `rig` raises ValueError, because there is no scale."""
+        """Rectifies a pair from its own matches, without a calibration: two photos taken side by side with one hand-held camera. `trust`
+        tells how reliable it is; `rig` raises ValueError, as there is no scale."""
     def apply(
         self,
         left: _Image,
@@ -202,45 +201,45 @@ class Rectification:
         mask: npt.ArrayLike | None = None,
         no_data: float | None = None,
     ) -> tuple[np.ma.MaskedArray[Any, Any], np.ma.MaskedArray[Any, Any]]:
-        """Rectifies a pair, and returns both views as masked arrays, masked where there is no source: uint8 of two uint8 images, else
-        uint16; of shape (height, width) or (height, width, 3)."""
+        """Rectifies a pair, and returns both views as masked arrays, masked without a source: uint8 for two uint8 images, else uint16; of
+        shape (height, width) or (height, width, 3)."""
     def maps(
         self,
     ) -> tuple[
         tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]],
         tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]],
     ]:
-        """Where each pixel of the rectified views is in the images: ((left_x, left_y), (right_x, right_y)), in pixels; +inf where it is
-        nowhere."""
+        """The source position of each pixel of the rectified views: ((left_x, left_y), (right_x, right_y)), in pixels; +inf without a
+        source."""
     @property
     def size(self) -> tuple[int, int]:
         """(width, height) of the rectified views, in pixels."""
     @property
     def raw_size(self) -> tuple[int, int]:
-        """(width, height) of the images that it rectifies, in pixels."""
+        """(width, height) of the raw left images, in pixels."""
     @property
     def rotations(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """The rotations from the frame of each camera to that of its rectified view: R1 and R2 of OpenCV, of shape (3, 3)."""
+        """The rotations from each camera's frame to that of its rectified view: R1 and R2 in OpenCV, of shape (3, 3)."""
     @property
     def rig(self) -> Rig:
-        """The cameras of the rectified pair: for depth and points. Raises ValueError of a rectification by matches alone."""
+        """The cameras of the rectified pair, for depth and points. Raises ValueError without a calibration."""
     @property
     def trust(self) -> dict[str, float] | None:
-        """How far a rectification by matches alone can be trusted: `matches`, `agreeing`, `median` and `percentile95` of the distance of
-        rows (pixels), `coverage` and `off_one_plane` (0 to 1). None of one by a calibration."""
+        """How reliable a rectification without a calibration is: `matches`, `agreeing`, `median` and `percentile95` of the row errors
+        (pixels), `coverage` and `off_one_plane` (0 to 1). None with a calibration."""
     def calib_txt(self) -> str:
-        """The calibration of the rectified pair in Middlebury's form, in millimetres where the unit is known."""
+        """The calibration of the rectified pair as Middlebury's calib.txt, in millimetres if the unit is known."""
     def cameras_yml(self) -> str:
-        """The calibration of the rectified pair for OpenCV, in the unit of the calibration."""
+        """The calibration of the rectified pair as OpenCV's YAML, in the unit of the calibration."""
 
 @final
 class Rig:
-    """The cameras of a rectified pair: from disparities to depths and points, in the unit of the baseline."""
+    """The cameras of a rectified pair, which turn disparities into depths and points, in the unit of the baseline."""
 
     def __new__(cls, calibration: _Cameras, *, size: Sequence[int] | None = None) -> Rig:
-        """By the calibration of a rectified pair; size is that of the images, where the calibration is for several."""
+        """From the calibration of a rectified pair; size is that of the images, if the calibration has several."""
     def of_part(self, x: int, y: int) -> Rig:
-        """That of a part of the images, whose first pixel is (x, y), such as the roi of match."""
+        """The rig of a crop of the images whose first pixel is (x, y), such as the roi of match."""
     @staticmethod
     def of(
         focal: float,
@@ -251,91 +250,90 @@ class Rig:
         size: Sequence[int] | None = None,
         unit: str = "unknown",
     ) -> Rig:
-        """That of a rectified pair by its focal length in pixels and its baseline; the principal point is the centre of images of
-        `size` unless it is given."""
+        """From focal length (pixels) and baseline; the principal point defaults to the centre of images of `size`."""
     def depth(self, disparity: npt.ArrayLike) -> npt.NDArray[np.float32]:
-        """The depth of every pixel along the optical axis, in the unit of the baseline, +inf where there is none."""
+        """The depth of every pixel along the optical axis, in the unit of the baseline, +inf if unknown."""
     def depth_sigma(self, disparity: npt.ArrayLike, sigma: npt.ArrayLike) -> npt.NDArray[np.float32]:
-        """The error to expect of every depth, in the unit of the baseline, of disparities with these errors (Matched.sigma); +inf where
-        there is none."""
+        """The expected error of every depth, in the unit of the baseline, from the errors of disparities (Matched.sigma); +inf if
+        unknown."""
     def millimetres(self, disparity: npt.ArrayLike) -> npt.NDArray[np.uint16]:
-        """The depth of every pixel in whole millimetres: 0 where there is none, and where it is above 65535."""
+        """The depth of every pixel in whole millimetres: 0 if unknown or above 65535."""
     def registered(self, disparity: npt.ArrayLike, camera: ThirdCamera | _Path) -> npt.NDArray[np.float32]:
-        """The depths as a third camera sees them, along its axis and at its pixels; +inf where it sees what the map does not."""
+        """The depths seen by a third camera, along its axis and at its pixels; +inf where it sees something that the map does not."""
     def registered_millimetres(self, disparity: npt.ArrayLike, camera: ThirdCamera | _Path) -> npt.NDArray[np.uint16]:
-        """The same in whole millimetres: 0 where there is none, and where it is above 65535."""
+        """Like `registered`, in whole millimetres: 0 if unknown or above 65535."""
     def points(self, matched: Matched, left: _Image) -> Points:
-        """The points that were measured and are trusted (validity 0), with the colours of the rectified left image."""
+        """The points of measured, trusted pixels (validity 0), with the colours of the rectified left image."""
     @property
     def cameras(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         """The matrices [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] of the left and the right camera, in pixels."""
     @property
     def doffs(self) -> float:
-        """Distance of the principal points along the row, cx of the right camera less cx of the left one, in pixels."""
+        """Distance of the principal points along the row, cx of the right camera minus cx of the left one, in pixels."""
     @property
     def baseline(self) -> float:
-        """Distance of the cameras, in `unit`."""
+        """Distance between the cameras, in `unit`."""
     @property
     def unit(self) -> str:
         """The unit of the baseline, of depths and of points: "mm", "cm", "m", or "unknown"."""
     @property
     def size(self) -> tuple[int, int] | None:
-        """(width, height) of the rectified images, in pixels; None where the calibration does not say it."""
+        """(width, height) of the rectified images, in pixels; None if the calibration lacks it."""
 
 @final
 class Drift:
-    """What the frames of a rig show of how its right camera has turned since it was calibrated."""
+    """Measures how the right camera of a rig has turned since its calibration."""
 
     def __new__(cls, rectification: Rectification) -> Drift:
-        """Of a rig with this rectification, from which nothing has turned yet."""
+        """For a rig with this rectification, before any turn."""
     def follow(self, left: _Image, right: _Image, max_disparity: float, *, min_disparity: float | None = None) -> None:
-        """Takes the rectified views of the next frame, and looks at them if it is their turn."""
+        """Takes the rectified views of the next frame, and evaluates some of the frames."""
     @property
     def turn(self) -> _Turn | None:
-        """How far the right camera looks up, to the right and clockwise of where it was calibrated: `degrees`, their standard `errors`,
-        how far that moves `rows` apart (pixels), how many `matches` show it, and whether it `counts`; None where they are too few."""
+        """The turn of the right camera up, right and clockwise since the calibration (`degrees`), its standard `errors`, the largest shift
+        of `rows` (pixels), the number of `matches`, and whether it `counts`; None with too few matches."""
     def correct(self) -> Rectification | None:
-        """What rectifies the next frames, where that is no longer what rectified the last ones."""
+        """The rectification for the next frames, if it differs from the last one; else None."""
 
 @final
 class Steady:
-    """A filter for the maps of a sequence: where the left image does not change, the disparity follows that of the frames before."""
+    """A filter for the maps of a sequence that steadies still surfaces by averaging with earlier frames."""
 
     def __new__(cls) -> Steady: ...
     def follow(self, matched: Matched, left: _Image) -> Matched:
-        """The same Matched with disparities that follow those of the frames before; left is the left image that was matched."""
+        """Returns a copy of `matched` with smoothed disparities; left is the left image that was matched."""
 
 @final
 class ThirdCamera:
-    """A camera beside the pair, such as the colour camera of a rig: its lens, its size and how it stands to the left camera."""
+    """A camera besides the pair, such as a colour camera: its lens, image size and pose relative to the left camera."""
 
     def __new__(cls, file: _Path) -> ThirdCamera: ...
     @staticmethod
     def of_text(text: str) -> ThirdCamera:
-        """The same of the text of such a file."""
+        """Reads it from the text of such a file."""
     @property
     def size(self) -> tuple[int, int]:
         """(width, height) of its images, in pixels."""
     @property
     def unit(self) -> str:
-        """The unit of its distance from the left camera: "mm", "cm", "m", or "unknown", which is taken for that of the pair."""
+        """The unit of its distance to the left camera: "mm", "cm", "m", or "unknown", which means that of the pair."""
 
 @final
 class Points:
-    """A cloud of points."""
+    """A point cloud."""
 
     def __new__(
         cls, positions: npt.ArrayLike, colours: npt.ArrayLike, confidence: npt.ArrayLike, unit: str = "unknown"
     ) -> Points: ...
     @property
     def positions(self) -> npt.NDArray[np.float32]:
-        """Where the points are, of shape (N, 3): x to the right, y down, z forward of the left camera, in the unit of the baseline."""
+        """The positions, of shape (N, 3): x to the right, y down, z forward of the left camera, in the unit of the baseline."""
     @property
     def colours(self) -> npt.NDArray[np.uint8]:
-        """Their colours, of shape (N, 3): red, green and blue."""
+        """The colours, of shape (N, 3): red, green and blue."""
     @property
     def confidence(self) -> npt.NDArray[np.uint8]:
-        """Their confidence, of shape (N,), in 1/8 nat."""
+        """The confidences, of shape (N,), in 1/8 nat."""
     @property
     def unit(self) -> str:
         """The unit of the positions: "mm", "cm", "m", or "unknown"."""
@@ -359,14 +357,13 @@ def match(
     device: str | int | None = None,
     threads: int | None = None,
 ) -> Matched:
-    """Matches one rectified pair, and returns its maps; help(mrfgs.Matcher) explains every argument."""
+    """Matches a single rectified pair, and returns its maps; help(mrfgs.Matcher) explains every argument."""
 
 def presets() -> dict[str, str]:
-    """Lists the presets: a dict from the name of each to what it is for."""
+    """Lists the presets: a dict from each name to its purpose."""
 
 def options() -> dict[str, dict[str, dict[str, Any]]]:
-    """Describes the options: a dict from each group to a dict from each of its keys to what it does, which values it takes, where
-    it comes from, and its value in each preset."""
+    """Describes the options: a dict from each group to a dict from each key to its meaning, values, source, and value in each preset."""
 
 _Turn = TypedDict(
     "_Turn",
@@ -402,12 +399,12 @@ class _Report(TypedDict):
     nonocc: _Errors | None
 
 def read_disparity(path: _Path, /) -> npt.NDArray[np.float32]:
-    """Reads a disparity map in pixels from a PFM, a float TIFF or a 16-bit PNG as KITTI has it; +inf where there is none."""
+    """Reads a disparity map in pixels from a PFM, a float TIFF or a 16-bit PNG as in KITTI; +inf if unknown."""
 
 def read_image(path: _Path, /, *, orient: bool = False) -> npt.NDArray[Any]:
-    """Reads an image as `match` takes it, from PNG, JPEG, PNM, TIFF or PFM: uint8, uint16, float32 or float64, of shape (height, width) or
-    (height, width, channels), RGB; a masked array where the file says that pixels hold no data."""
+    """Reads an image for `match` from PNG, JPEG, PNM, TIFF or PFM: uint8, uint16, float32 or float64, of shape (height, width) or (height,
+    width, channels), RGB; a masked array if the file marks pixels as no data."""
 
 def evaluate(disparity: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> _Report:
-    """Compares a disparity map with the truth, as `mrfgs evaluate map` does: errors in pixels and shares in percent, over all pixels
-    with known truth and over those of them that both views see."""
+    """Compares a disparity map with the ground truth, as `mrfgs evaluate map` does: errors in pixels and shares in percent, over all pixels
+    with known truth and over those seen by both views."""

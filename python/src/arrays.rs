@@ -1,4 +1,4 @@
-//! Arrays of any layout, byte order and masking, as images, maps and masks of the crate `mrfgs`, and back.
+//! Conversion between numpy arrays of any layout, byte order and masking and the crate's images, maps and masks.
 
 use std::borrow::Cow;
 
@@ -15,22 +15,21 @@ use pyo3::types::{PyBytes, PyDict, PyString, PyTuple};
 
 use crate::exceptions::{self, exception};
 
-/// What is given for `name` as an array, in the byte order of this machine and aligned; copied where it is not. A masked array
-/// stays one.
+/// The argument `name` as an aligned array in native byte order, copied if necessary. A masked array stays one.
 fn array<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
     let (py, numpy) = (given.py(), given.py().import("numpy")?);
     if is_path(given)? {
         return Err(PyTypeError::new_err(format!(
-            "{name}: give a numpy array, not the path of a file; mrfgs.read_image reads an image, and mrfgs.read_disparity a map"
+            "{name}: give a numpy array, not the path of a file; read images with mrfgs.read_image and maps with mrfgs.read_disparity"
         )));
     }
     let wrong = || PyTypeError::new_err(format!("{name}: give a numpy array"));
-    // Other libraries may offer their arrays by this protocol alone.
+    // Some libraries offer their arrays only through this protocol.
     let by_dlpack = given.hasattr("__dlpack__")? && !given.hasattr("__array__")?;
     let array = numpy.call_method1(if by_dlpack { "from_dlpack" } else { "asanyarray" }, (given,));
     let array = array.map_err(|error| exceptions::instead(py, error, wrong()))?;
     let mut array = array.cast_into::<PyUntypedArray>().map_err(|_| wrong())?;
-    // Single precision holds every half-precision value exactly.
+    // Single precision represents every half-precision value exactly.
     if (array.dtype().kind(), array.dtype().itemsize()) == (b'f', 2) {
         array = array.call_method1("astype", ("float32",))?.cast_into()?;
     }
@@ -43,26 +42,28 @@ fn array<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUn
     Ok(array.call_method1("astype", (dtype,))?.cast_into()?)
 }
 
-/// Whether a path is given in the place of an array.
+/// Whether a path was given instead of an array.
 fn is_path(given: &Bound<PyAny>) -> PyResult<bool> {
     Ok(given.is_instance_of::<PyString>()
         || given.is_instance_of::<PyBytes>()
         || given.hasattr("__fspath__")?)
 }
 
-/// The values of an array, row by row: borrowed where they lie so, else copied.
+/// The values of an array, row by row; borrowed if they are contiguous, else copied.
 fn values<'a, T: Element + Copy>(name: &str, array: &'a PyReadonlyArrayDyn<T>) -> PyResult<Cow<'a, [T]>> {
-    // A slice has the order of the memory, which is that of the rows in C-ordered arrays alone.
+    // A slice follows memory order, which is row order only in C-contiguous arrays.
     if array.is_c_contiguous()
         && let Ok(slice) = array.as_slice()
     {
         return Ok(Cow::Borrowed(slice));
     }
-    // A broadcast array may be far larger than what it takes.
+    // A broadcast array may be far larger than its memory.
     let mut copy = Vec::new();
     let lacking = |_| {
         let gib = array.len() as f64 * size_of::<T>() as f64 / f64::from(1 << 30);
-        PyMemoryError::new_err(format!("{name}: a copy of {gib:.1} GiB cannot be had; give a smaller image"))
+        PyMemoryError::new_err(format!(
+            "{name}: cannot allocate a copy of {gib:.1} GiB; give a smaller image"
+        ))
     };
     copy.try_reserve_exact(array.len()).map_err(lacking)?;
     copy.extend(array.as_array().iter().copied());
@@ -73,7 +74,7 @@ fn values<'a, T: Element + Copy>(name: &str, array: &'a PyReadonlyArrayDyn<T>) -
 pub(crate) struct Image<'py> {
     name: &'static str,
     pixels: Pixels<'py>,
-    /// Whether its values, and not its type, say how many bits it has.
+    /// Whether the number of bits was derived from the values instead of the type.
     by_values: bool,
     /// Where a masked array is masked.
     masked: Option<Plane<bool>>,
@@ -87,16 +88,16 @@ enum Pixels<'py> {
 }
 
 impl<'py> Pixels<'py> {
-    /// Whole numbers of another type: what arithmetic with numpy makes of images. They are bytes where all of them fit, else words.
+    /// Converts integers of other types, as numpy arithmetic gives for images: to bytes if all values fit, else to words.
     fn by_values(name: &str, array: &Bound<'py, PyUntypedArray>) -> PyResult<Self> {
         let kind: char = array.dtype().getattr("kind")?.extract()?;
         if !"iu".contains(kind) {
             let kind = array.dtype().to_string();
             return Err(PyTypeError::new_err(format!(
-                "{name}: give an array of whole numbers, float16, float32 or float64, not {kind}; astype converts it"
+                "{name}: give an array of integers, float16, float32 or float64, not {kind}; convert it with astype"
             )));
         }
-        // What is masked may be anything.
+        // Masked values may be anything.
         let array = if array.hasattr("filled")? {
             array.call_method1("filled", (0,))?
         } else {
@@ -114,7 +115,7 @@ impl<'py> Pixels<'py> {
         if let Some(value) = wrong {
             let kind = array.getattr("dtype")?.to_string();
             return Err(PyValueError::new_err(format!(
-                "{name}: is {kind} and holds {value}; whole numbers are 0 to 255 or 0 to 65535: give what they mean, such as \
+                "{name}: is {kind} and contains {value}; integers must be 0 to 255 or 0 to 65535: convert them, for example with \
                  {name}.astype(numpy.float32), or a masked array"
             )));
         }
@@ -126,12 +127,12 @@ impl<'py> Pixels<'py> {
     }
 }
 
-/// The same numbers, which fit, in another type.
+/// Converts numbers that fit to another type.
 fn converted<'py, T: Element>(array: &Bound<'py, PyAny>, kind: &str) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
     Ok(array.call_method1("astype", (kind,))?.cast_into::<PyArrayDyn<T>>()?.readonly())
 }
 
-/// The array for reading, where its elements are of this type.
+/// The array for reading, if its elements have this type.
 fn readonly<'py, T: Element>(array: &Bound<'py, PyUntypedArray>) -> Option<PyReadonlyArrayDyn<'py, T>> {
     array.as_any().cast::<PyArrayDyn<T>>().ok().map(|array| array.readonly())
 }
@@ -150,7 +151,7 @@ impl<'py> Image<'py> {
         Ok(Self { name, pixels, by_values, masked })
     }
 
-    /// Both views. Where the values of one say its bits, and the other has 16, so has that one.
+    /// Both views. If one was converted by its values and the other has 16 bits, it gets 16 bits as well.
     pub(crate) fn both(left: &Bound<'py, PyAny>, right: &Bound<'py, PyAny>) -> PyResult<[Self; 2]> {
         let mut views = [Self::of("left", left)?, Self::of("right", right)?];
         if views.iter().any(|view| matches!(view.pixels, Pixels::Word(_))) {
@@ -177,7 +178,7 @@ impl<'py> Image<'py> {
             [height, width] => (height, width, 1),
             [1..=4, height, width] if width > 4 => {
                 return Err(PyValueError::new_err(format!(
-                    "{name}: has the shape {}, with the channels first: give (height, width, channels), such as \
+                    "{name}: has the shape {}, with channels first: give (height, width, channels), for example \
                      numpy.moveaxis({name}, 0, -1), which has {height} rows of {width} pixels",
                     shown(shape)
                 )));
@@ -200,7 +201,7 @@ impl<'py> Image<'py> {
 }
 
 impl Image<'_> {
-    /// How its rectified image is stored: with one channel or three, and in 8 bits where the other image has them, too.
+    /// The array format of its rectified image: one channel or three, and 8 bits if both images have 8.
     pub(crate) fn stored(&self, other: &Self) -> Stored {
         let shape = match &self.pixels {
             Pixels::Byte(a) => a.shape(),
@@ -213,7 +214,7 @@ impl Image<'_> {
     }
 }
 
-/// The pair of two images, less what a mask and a value for no data say.
+/// The pair of two images, without the pixels of a mask or a no-data value.
 pub(crate) fn pair(
     left: &Image,
     right: &Image,
@@ -254,14 +255,14 @@ fn rasters<'a>(
     left.and_then(|left| Ok([left, right?])).map_err(exception)
 }
 
-/// How an image is stored in an array.
+/// The array format of an image.
 #[derive(Clone, Copy)]
 pub(crate) struct Stored {
     channels: usize,
     bytes: bool,
 }
 
-/// The images of a pair as masked arrays. Those of more than 8 bits hold what `match` takes for the same levels again.
+/// The images of a pair as masked arrays. Images of more than 8 bits are scaled so that `match` reads the same levels from them.
 pub(crate) fn images<'py>(
     py: Python<'py>,
     pair: &Pair,
@@ -297,7 +298,7 @@ fn masked_array<'py, T: Element>(
     py.import("numpy")?.getattr("ma")?.call_method1("masked_array", (values, masked))
 }
 
-/// An image as its file stores it: of shape (height, width) or (height, width, channels), and masked where it holds no data.
+/// An image as stored in its file: of shape (height, width) or (height, width, channels), a masked array if it has no-data pixels.
 pub(crate) fn stored<'py>(py: Python<'py>, raster: &Raster) -> PyResult<Bound<'py, PyAny>> {
     let ((width, height), channels) = (raster.size(), raster.channels());
     let shape = if channels == 1 { vec![height, width] } else { vec![height, width, channels] };
@@ -319,7 +320,7 @@ pub(crate) fn map<T: Element>(py: Python, plane: Plane<T>) -> PyResult<Bound<PyA
     plane.into_data().into_pyarray(py).reshape(shape)
 }
 
-/// The matrices of both views as arrays of float64.
+/// The matrices of both views as float64 arrays.
 pub(crate) fn matrices<'py>(py: Python<'py>, both: &[Matrix; 2]) -> PyResult<Bound<'py, PyTuple>> {
     let matrix = |matrix: &Matrix| {
         let rows: Vec<Vec<f64>> = matrix.iter().map(|row| row.to_vec()).collect();
@@ -328,7 +329,7 @@ pub(crate) fn matrices<'py>(py: Python<'py>, both: &[Matrix; 2]) -> PyResult<Bou
     PyTuple::new(py, [matrix(&both[0])?, matrix(&both[1])?])
 }
 
-/// A map of disparities; what a masked array masks is not finite.
+/// A disparity map; masked values become infinite.
 pub(crate) fn disparities(name: &str, given: &Bound<PyAny>) -> PyResult<Plane<f32>> {
     let array = array(name, given)?;
     let masked = masked(name, &array)?;
@@ -339,7 +340,7 @@ pub(crate) fn disparities(name: &str, given: &Bound<PyAny>) -> PyResult<Plane<f3
     } else {
         let kind = array.dtype().to_string();
         return Err(PyTypeError::new_err(format!(
-            "{name}: give an array of float16, float32 or float64, in pixels, not {kind}; divide whole numbers by their scale"
+            "{name}: give an array of float16, float32 or float64, in pixels, not {kind}; divide integers by their scale"
         )));
     };
     let Some(masked) = masked else { return Ok(plane) };
@@ -347,7 +348,7 @@ pub(crate) fn disparities(name: &str, given: &Bound<PyAny>) -> PyResult<Plane<f3
     Ok(Plane::from_fn(width, height, |x, y| if masked[(x, y)] { f32::INFINITY } else { plane[(x, y)] }))
 }
 
-/// A map of bytes.
+/// An 8-bit map.
 pub(crate) fn bytes(name: &str, given: &Bound<PyAny>) -> PyResult<Plane<u8>> {
     let array = array(name, given)?;
     match array.as_any().cast::<PyArrayDyn<u8>>() {
@@ -359,24 +360,23 @@ pub(crate) fn bytes(name: &str, given: &Bound<PyAny>) -> PyResult<Plane<u8>> {
     }
 }
 
-/// A visibility mask as files have it: 255 where both views see a pixel.
+/// A visibility mask as in files: 255 where both views see a pixel.
 pub(crate) fn visible(given: &Bound<PyAny>) -> PyResult<Plane<u8>> {
-    const EXPECTED: &str =
-        "mask: give an array of bool, or of uint8 that is 255 where both views see the pixel";
+    const EXPECTED: &str = "mask: give an array of bool, or of uint8 with 255 where both views see the pixel";
     let array = array("mask", given)?;
     if let Ok(array) = array.as_any().cast::<PyArrayDyn<bool>>() {
         return Ok(plane("mask", &array.readonly())?.map(|seen| if *seen { 255 } else { 0 }));
     }
     let array = array.as_any().cast::<PyArrayDyn<u8>>().map_err(|_| PyTypeError::new_err(EXPECTED))?;
     let mask = plane("mask", &array.readonly())?;
-    // Zeros and ones would leave no pixel, without a word.
+    // A mask of zeros and ones would silently leave no pixel.
     if mask.data().iter().max() == Some(&1) {
-        return Err(PyValueError::new_err(format!("{EXPECTED}; this one has 1 there")));
+        return Err(PyValueError::new_err(format!("{EXPECTED}; this one has at most 1")));
     }
     Ok(mask)
 }
 
-/// The values of an array of one type and shape, row by row; a `None` in the shape is any length. `expected` is what to give.
+/// The values of an array, row by row, of shape (N,) or (N, `columns`). `expected` describes it in errors.
 pub(crate) fn table<T: Element + Copy>(
     name: &str,
     given: &Bound<PyAny>,
@@ -394,7 +394,7 @@ pub(crate) fn table<T: Element + Copy>(
     Ok(values(name, &array)?.into_owned())
 }
 
-/// Where a masked array is masked, in any of its channels; `None` for other arrays.
+/// Where a masked array is masked, in any channel; `None` for other arrays.
 fn masked(name: &str, array: &Bound<PyUntypedArray>) -> PyResult<Option<Plane<bool>>> {
     let numpy = array.py().import("numpy")?;
     let ma = numpy.getattr("ma")?;
@@ -408,13 +408,13 @@ fn masked(name: &str, array: &Bound<PyUntypedArray>) -> PyResult<Option<Plane<bo
     flags(name, &mask).map(Some)
 }
 
-/// A mask: where an array of shape (height, width) is not 0.
+/// A mask of shape (height, width), set where the array is not 0.
 pub(crate) fn mask(given: &Bound<PyAny>) -> PyResult<Plane<bool>> {
     let array = array("mask", given)?;
     let kind: char = array.dtype().getattr("kind")?.extract()?;
     if !"biuf".contains(kind) {
         return Err(PyTypeError::new_err(
-            "mask: give an array of bool, or of numbers that are 0 where pixels count",
+            "mask: give an array of bool, or of numbers that are 0 for valid pixels",
         ));
     }
     flags("mask", &array.call_method1("astype", ("bool",))?)
@@ -429,7 +429,8 @@ fn plane<T: Element + Copy>(name: &str, array: &PyReadonlyArrayDyn<T>) -> PyResu
         [height, width] => Ok(Plane::new(width, height, values(name, array)?.into_owned())),
         ref shape => {
             let squeezed = shape.iter().filter(|count| **count != 1).count() == 2;
-            let remedy = if squeezed { format!("; numpy.squeeze({name}) has it") } else { String::new() };
+            let remedy =
+                if squeezed { format!("; numpy.squeeze({name}) has that shape") } else { String::new() };
             let shape = shown(shape);
             let reason = format!("{name}: give an array of shape (height, width), not {shape}{remedy}");
             Err(PyValueError::new_err(reason))
@@ -437,7 +438,7 @@ fn plane<T: Element + Copy>(name: &str, array: &PyReadonlyArrayDyn<T>) -> PyResu
     }
 }
 
-/// A shape as numpy shows it.
+/// A shape as numpy prints it.
 fn shown(shape: &[usize]) -> String {
     let counts: Vec<_> = shape.iter().map(ToString::to_string).collect();
     format!("({}{})", counts.join(", "), if counts.len() == 1 { "," } else { "" })
@@ -446,7 +447,7 @@ fn shown(shape: &[usize]) -> String {
 /// Width and height, given as `size`.
 pub(crate) fn size(given: &Bound<PyAny>) -> PyResult<(usize, usize)> {
     let wrong = |error| {
-        let reason = PyTypeError::new_err("size: give (width, height), two whole numbers of pixels");
+        let reason = PyTypeError::new_err("size: give (width, height), two integers");
         exceptions::instead(given.py(), error, reason)
     };
     let [width, height]: [i64; 2] = given.extract().map_err(wrong)?;

@@ -20,14 +20,14 @@ use crate::matched::PyMatched;
 use crate::third::PyThirdCamera;
 use crate::words;
 
-/// The cameras of a rectified pair: from disparities to depths and points.
+/// The cameras of a rectified pair, which turn disparities into depths and points.
 ///
-/// calibration: that of the rectified pair, as a Calibration, the path of a file, or a list of the paths of two: calib.txt, OpenCV's
-///     P1 and P2, ROS's projections. For raw images, Rectification.rig has it.
-/// size: (width, height) of the rectified images in pixels, where the calibration is for several; None takes its only one.
+/// calibration: the calibration of the rectified pair, as a Calibration, the path of a file, or a list of two paths: calib.txt, OpenCV's P1
+///     and P2, ROS's projections. For raw images, use Rectification.rig.
+/// size: (width, height) of the rectified images in pixels, if the calibration has several; None uses its only one.
 ///
-/// A point at depth Z has the disparity d with d + doffs = baseline * f / Z. Depths and points have the unit of the baseline.
-/// Raises ValueError for a calibration that does not say the rectified cameras. Rig.of takes numbers in the place of a calibration.
+/// A point at depth Z has disparity d with d + doffs = baseline * f / Z. Depths and points have the unit of the baseline. Raises ValueError
+/// for a calibration without rectified cameras. Rig.of takes numbers instead of a calibration.
 #[pyclass(name = "Rig", frozen, module = "mrfgs")]
 pub(crate) struct PyRig {
     rig: Rig,
@@ -35,18 +35,17 @@ pub(crate) struct PyRig {
     doffs: f64,
     baseline: f64,
     size: Option<(usize, usize)>,
-    /// What says so, as messages name it.
+    /// The origin of the values, for messages.
     names: String,
-    /// The rotation from the frame of the original left camera to the rectified one, where a rectification has made the pair.
+    /// The rotation from the original left camera's frame to the rectified frame, if there was a rectification.
     rectifying: Option<Matrix>,
 }
 
-/// The numbers of a rig: focal lengths, principal point, doffs and baseline, unit, size, the name of what says so, and the rotation of the
-/// rectification.
+/// The state of a rig: focal lengths, principal point, doffs and baseline, unit, size, origin, and rotation of the rectification.
 type Numbers = ([f64; 2], [f64; 2], [f64; 2], String, Option<(usize, usize)>, String, Option<Matrix>);
 
 impl PyRig {
-    /// That of a rectified pair, by the calibration that it comes from, and by the rotation that rectified the left image, if one did.
+    /// The rig of a rectified pair, from the calibration `known` and the rotation that rectified the left image, if there was one.
     pub(crate) fn of_rectified(
         rectified: &Calibration,
         rectifying: Option<Matrix>,
@@ -62,7 +61,7 @@ impl PyRig {
         }
         let size =
             rectified.width.zip(rectified.height).map(|(width, height)| (width as usize, height as usize));
-        // What a rig has, its calibration says.
+        // A rig exists only if its calibration has these values.
         let camera = rectified.camera.unwrap_or(Camera { focal_length: [0.0; 2], principal_point: [0.0; 2] });
         let (doffs, baseline) = (rectified.doffs.unwrap_or_default(), rectified.baseline.unwrap_or_default());
         Ok(Self { rig, camera, doffs, baseline, size, names, rectifying })
@@ -86,21 +85,21 @@ impl PyRig {
         (focal_length, principal_point, [self.doffs, self.baseline], unit, self.size, names, self.rectifying)
     }
 
-    /// Refuses a map of another size than that of the calibration.
+    /// Refuses a map whose size differs from the calibration.
     fn check(&self, name: &str, (w, h): (usize, usize)) -> PyResult<()> {
         match self.size {
             Some((width, height)) if (width, height) != (w, h) => Err(PyValueError::new_err(format!(
-                "{name}: is {w} x {h}, and {} is of images of {width} x {height}: depth takes the calibration of this size",
+                "{name}: is {w} x {h}, but {} is for images of {width} x {height}: give the calibration of this size",
                 self.names
             ))),
             _ => Ok(()),
         }
     }
 
-    /// Millimetres take a known unit.
+    /// The error of millimetres without a known unit.
     fn unit_unknown(&self) -> PyErr {
         PyValueError::new_err(format!(
-            "{}: does not say the unit of the baseline; give it by Calibration(..., unit=\"m\") or Rig.of(..., unit=\"m\"), or add an \
+            "{}: lacks the unit of the baseline; use Calibration(..., unit=\"m\") or Rig.of(..., unit=\"m\"), or add an \
              entry `unit` to the file: mm, cm or m",
             self.names
         ))
@@ -116,7 +115,7 @@ impl PyRig {
     }
 }
 
-/// Says what is probably wrong with the calibration of a rectified pair.
+/// Warns about the calibration of a rectified pair.
 fn tell(py: Python, rectified: &Calibration, size: Option<(usize, usize)>, names: &str) -> PyResult<()> {
     let doubts = Doubt::about(rectified, size.map(|(width, _)| width));
     exceptions::tell(py, doubts.iter().map(|doubt| words::doubt(doubt, names)))
@@ -131,7 +130,7 @@ impl PyRig {
         let rectified = known.cameras.of_rectified_images(size).map_err(|error| known.wrong(error))?;
         let rectified = rectified.ok_or_else(|| {
             PyValueError::new_err(format!(
-                "{}: is of images that are not rectified; take the rig of a Rectification, or give the calibration of the \
+                "{}: describes images that are not rectified; use Rectification(...).rig, or give the calibration of the \
                  rectified pair",
                 known.names
             ))
@@ -141,15 +140,15 @@ impl PyRig {
         Ok(made)
     }
 
-    /// That of a rectified pair whose cameras no file describes: by their focal length and the distance between them.
+    /// Makes the rig of a rectified pair from its focal length and the distance between its cameras, without a file.
     ///
-    /// focal: the focal length in pixels: that in millimetres divided by the width of a pixel on the sensor.
-    /// baseline: the distance of the cameras, in the unit of all depths.
-    /// principal_point: (cx, cy) of the left camera in pixels; None takes the centre of images of `size`, ((width - 1) / 2,
-    ///     (height - 1) / 2). Depths do not depend on it, points do.
-    /// doffs: cx of the right camera less cx of the left one, in pixels.
-    /// size: (width, height) of the images in pixels, of which maps must be; needed where principal_point is not given.
-    /// unit: the unit of the baseline, "mm", "cm" or "m"; `millimetres` takes it.
+    /// focal: the focal length in pixels: the one in millimetres divided by the width of a pixel on the sensor.
+    /// baseline: the distance between the cameras, in the unit of all depths.
+    /// principal_point: (cx, cy) of the left camera in pixels; None uses the centre of images of `size`, ((width - 1) / 2, (height - 1) /
+    ///     2). It affects points but not depths.
+    /// doffs: cx of the right camera minus cx of the left one, in pixels.
+    /// size: (width, height) of the images in pixels, which maps must have; required without principal_point.
+    /// unit: the unit of the baseline, "mm", "cm" or "m"; `millimetres` needs it.
     #[staticmethod]
     #[pyo3(signature = (focal, baseline, *, principal_point=None, doffs=0.0, size=None, unit="unknown"))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
@@ -172,13 +171,13 @@ impl PyRig {
             principal_point.or_else(|| size.map(|size| Camera::centred(focal, size).principal_point))
         else {
             return Err(PyValueError::new_err(
-                "size: give (width, height) of the images, whose centre is the principal point, or principal_point",
+                "size: give (width, height) of the images, to use their centre as the principal point, or give principal_point",
             ));
         };
         let [cx, cy] = principal_point;
         if let Some(value) = [cx, cy, doffs].into_iter().find(|value| !value.is_finite()) {
             return Err(PyValueError::new_err(format!(
-                "principal_point and doffs: give numbers, not {value}"
+                "principal_point and doffs: give finite numbers, not {value}"
             )));
         }
         let unit = calibration::unit(unit)?;
@@ -190,16 +189,16 @@ impl PyRig {
         Self::of_numbers(([focal; 2], principal_point, [doffs, baseline], unit, size, names, None))
     }
 
-    /// That of a part of the images, whose first pixel is (x, y), such as the roi of `match`: for the maps and the left image of that
-    /// part. It takes maps of any size.
+    /// The rig of a crop of the images whose first pixel is (x, y), such as the roi of `match`, for the maps and the left image of that
+    /// crop. It accepts maps of any size.
     fn of_part(&self, x: usize, y: usize) -> PyResult<Self> {
         let (focal, [cx, cy], apart, unit, _, names, rectifying) = self.numbers();
         let principal_point = [cx - x as f64, cy - y as f64];
         Self::of_numbers((focal, principal_point, apart, unit, None, names, rectifying))
     }
 
-    /// The depth of every pixel along the optical axis, float32 in the unit of the baseline, +inf where there is none: where the
-    /// disparity is not finite or masked, and where d + doffs is 0 or less.
+    /// The depth of every pixel along the optical axis, float32 in the unit of the baseline; +inf if the disparity is masked or not finite,
+    /// or if d + doffs is 0 or less.
     ///
     /// disparity: array of shape (height, width), float32 or float64, in pixels, such as Matched.disparity.
     fn depth<'py>(&self, py: Python<'py>, disparity: &Bound<PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
@@ -207,10 +206,10 @@ impl PyRig {
         arrays::map(py, py.detach(|| self.rig.depths(&map)))
     }
 
-    /// The error to expect of every depth, float32 in the unit of the baseline, +inf where there is none: Z sigma / (d + doffs).
+    /// The expected error of every depth, float32 in the unit of the baseline, +inf if unknown: Z sigma / (d + doffs).
     ///
     /// disparity: as in `depth`.
-    /// sigma: the errors of the disparities, an array of the same shape in pixels, such as Matched.sigma.
+    /// sigma: the errors of the disparities, an array of the same shape, in pixels, such as Matched.sigma.
     fn depth_sigma<'py>(
         &self,
         py: Python<'py>,
@@ -221,17 +220,17 @@ impl PyRig {
         if map.size() != sigmas.size() {
             let [(w, h), (width, height)] = [sigmas.size(), map.size()];
             return Err(PyValueError::new_err(format!(
-                "sigma: is {w} x {h}, and disparity {width} x {height}: give maps of one view"
+                "sigma: is {w} x {h}, but disparity is {width} x {height}: give maps of the same view"
             )));
         }
         arrays::map(py, py.detach(|| self.rig.depth_sigmas(&map, &sigmas)))
     }
 
-    /// The depth of every pixel in whole millimetres, uint16, as ROS and TUM have it: 0 where there is none, and where it is above 65535.
+    /// The depth of every pixel in whole millimetres, uint16, as in ROS and TUM: 0 if unknown or above 65535.
     ///
     /// disparity: as in `depth`.
     ///
-    /// Raises ValueError where the unit of the baseline is not known; Calibration(..., unit="m") and Rig.of(..., unit="m") state it.
+    /// Raises ValueError if the unit of the baseline is unknown; set it with Calibration(..., unit="m") or Rig.of(..., unit="m").
     fn millimetres<'py>(
         &self,
         py: Python<'py>,
@@ -242,12 +241,12 @@ impl PyRig {
         arrays::map(py, depths)
     }
 
-    /// The depths as a third camera sees them, along its axis and at its pixels: float32 in the unit of the baseline, +inf where it sees
-    /// what the map does not. The nearest of several surfaces counts, and each pixel of the map covers what it covers there.
+    /// The depths seen by a third camera, along its axis and at its pixels: float32 in the unit of the baseline, +inf where it sees
+    /// something that the map does not. The nearest surface wins, and each pixel of the map covers its projected area.
     ///
     /// disparity: as in `depth`.
-    /// camera: a ThirdCamera, or the path of its file. Its pose is that to the left camera which took the images where the rig is that of
-    ///     a Rectification, else that to the rectified one.
+    /// camera: a ThirdCamera, or the path of its file. Its pose is relative to the original left camera if the rig is from a Rectification,
+    ///     else to the rectified left camera.
     fn registered<'py>(
         &self,
         py: Python<'py>,
@@ -258,7 +257,7 @@ impl PyRig {
         arrays::map(py, py.detach(|| self.rig.registered(&map, &camera)))
     }
 
-    /// The same in whole millimetres, uint16, as `millimetres` has them. Raises ValueError as that.
+    /// Like `registered`, in whole millimetres as uint16, like `millimetres`, with the same ValueError.
     fn registered_millimetres<'py>(
         &self,
         py: Python<'py>,
@@ -270,11 +269,10 @@ impl PyRig {
         arrays::map(py, depths.ok_or_else(|| self.unit_unknown())?)
     }
 
-    /// The points that were measured and are trusted (validity 0), row by row, in the frame of the left camera: x to the right, y down,
-    /// z forward.
+    /// The points of measured, trusted pixels (validity 0), row by row, in the frame of the left camera: x to the right, y down, z forward.
     ///
-    /// matched: what the match of the rectified pair has returned.
-    /// left: the rectified left image, as `match` takes it. It gives the colours; 16 bits and floats fill the range of it alone.
+    /// matched: the result of the match of the rectified pair.
+    /// left: the rectified left image, as for `match`, for the colours; 16 bits and floats are scaled to its own range.
     fn points(&self, py: Python, matched: &Bound<PyMatched>, left: &Bound<PyAny>) -> PyResult<PyPoints> {
         let maps = matched.get().maps(py)?;
         self.check("matched", maps.disparity.size())?;
@@ -283,7 +281,7 @@ impl PyRig {
         if pair.size() != maps.disparity.size() {
             let ((width, height), (w, h)) = (maps.disparity.size(), pair.size());
             return Err(PyValueError::new_err(format!(
-                "left: is {w} x {h} and the maps are {width} x {height}; give the rectified image that was matched"
+                "left: is {w} x {h} but the maps are {width} x {height}; give the rectified image that was matched"
             )));
         }
         let cloud = py.detach(|| self.rig.cloud(&maps, pair.left()));
@@ -298,25 +296,25 @@ impl PyRig {
         arrays::matrices(py, &[camera(cx), camera(cx + self.doffs)])
     }
 
-    /// Distance of the principal points along the row, cx of the right camera less cx of the left one, in pixels.
+    /// Distance of the principal points along the row, cx of the right camera minus cx of the left one, in pixels.
     #[getter]
     fn doffs(&self) -> f64 {
         self.doffs
     }
 
-    /// Distance of the cameras, in `unit`.
+    /// Distance between the cameras, in `unit`.
     #[getter]
     fn baseline(&self) -> f64 {
         self.baseline
     }
 
-    /// The unit of the baseline, of depths and of points: "mm", "cm", "m", or "unknown" where the calibration does not say it.
+    /// The unit of the baseline, of depths and of points: "mm", "cm", "m", or "unknown" if the calibration lacks it.
     #[getter]
     fn unit(&self) -> &'static str {
         self.rig.unit().name()
     }
 
-    /// (width, height) of the rectified images, in pixels; None where the calibration does not say it.
+    /// (width, height) of the rectified images, in pixels; None if the calibration lacks it.
     #[getter]
     fn size(&self) -> Option<(usize, usize)> {
         self.size
@@ -330,7 +328,7 @@ impl PyRig {
         )
     }
 
-    /// How `pickle` and `copy` make another one.
+    /// Supports `pickle` and `copy`.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Numbers,))> {
         Ok((py.get_type::<Self>().getattr("_again")?, (self.numbers(),)))
     }
@@ -341,22 +339,21 @@ impl PyRig {
     }
 }
 
-/// A cloud of points.
+/// A point cloud.
 ///
 /// positions: array (N, 3) of float32 or float64: x, y, z.
 /// colours: array (N, 3) of uint8: red, green, blue.
 /// confidence: array (N,) of uint8.
-/// unit: the unit of the positions, "mm", "cm", "m" or "unknown": files say it.
+/// unit: the unit of the positions, "mm", "cm", "m" or "unknown", which files record.
 ///
-/// Rig.points makes one; make another one of a part of it, as in Points(p.positions[near], p.colours[near], p.confidence[near], p.unit).
+/// Rig.points makes one. To select points, write for example Points(p.positions[near], p.colours[near], p.confidence[near], p.unit).
 #[pyclass(name = "Points", frozen, get_all, module = "mrfgs")]
 pub(crate) struct PyPoints {
-    /// Where the points are: float32 of shape (N, 3), x to the right, y down, z forward of the left camera, in the unit of the
-    /// baseline.
+    /// The positions: float32 of shape (N, 3), x to the right, y down, z forward of the left camera, in the unit of the baseline.
     positions: Py<PyArray2<f32>>,
-    /// Their colours: uint8 of shape (N, 3), red, green and blue.
+    /// The colours: uint8 of shape (N, 3), red, green and blue.
     colours: Py<PyArray2<u8>>,
-    /// Their confidence: uint8 of shape (N,), in 1/8 nat.
+    /// The confidences: uint8 of shape (N,), in 1/8 nat.
     confidence: Py<PyArray1<u8>>,
     /// The unit of the positions: "mm", "cm", "m", or "unknown".
     unit: String,
@@ -400,7 +397,7 @@ impl PyPoints {
         let [count, ..] = counts;
         if counts != [count; 3] {
             return Err(PyValueError::new_err(format!(
-                "{} positions, {} colours and {} values of confidence: give as many of each",
+                "{} positions, {} colours and {} confidences: give the same number of each",
                 counts[0], counts[1], counts[2]
             )));
         }
@@ -412,13 +409,13 @@ impl PyPoints {
         Self::of(py, &points.collect::<Vec<_>>(), calibration::unit(unit)?)
     }
 
-    /// Writes the points as binary PLY or PCD, LAS 1.2 or LAZ, completely or not at all: the file that `mrfgs match` writes for
-    /// `--also points`, `points.pcd`, `points.las` and `points.laz`. In PLY the confidence is called `quality`, as MeshLab has it; in LAS
-    /// and LAZ it is the intensity, times 257, and positions are rounded to steps of a millionth of the distance of the nearest point.
+    /// Writes the points as binary PLY or PCD, LAS 1.2 or LAZ, completely or not at all, like `mrfgs match --also` with `points`,
+    /// `points.pcd`, `points.las` and `points.laz`. The confidence is `quality` in PLY, as in MeshLab, and 257 times the confidence is the
+    /// intensity in LAS and LAZ, where positions are rounded to a millionth of the distance of the nearest point.
     ///
     /// path: a name that ends in .ply, .pcd, .las or .laz.
     ///
-    /// Raises OSError where it cannot be written.
+    /// Raises OSError if it cannot be written.
     fn save(&self, py: Python, path: PathBuf) -> PyResult<()> {
         let positions =
             arrays::table::<f32>("positions", self.positions.bind(py), Some(3), "shape (N, 3), float32")?;
@@ -442,7 +439,7 @@ impl PyPoints {
         format!("<mrfgs.Points: {}>", self.__len__(py))
     }
 
-    /// How `pickle` and `copy` make another one.
+    /// Supports `pickle` and `copy`.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Bound<'py, PyTuple>)> {
         let all = (self.positions.bind(py), self.colours.bind(py), self.confidence.bind(py), &self.unit);
         Ok((py.get_type::<Self>(), all.into_pyobject(py)?))

@@ -1,4 +1,4 @@
-//! Rigs that drift, and how they are put right.
+//! Tracking of rigs whose right camera turns, and correction of their rectification.
 
 use mrfgs::drift::Drift;
 use mrfgs::low_level::process::Turns;
@@ -11,12 +11,12 @@ use crate::exceptions::exception;
 use crate::range;
 use crate::rectification::PyRectification;
 
-/// What the frames of a rig show of how its right camera has turned since it was calibrated. Shocks and warmth turn cameras by tenths of a
-/// degree; then rows no longer line up, and maps get holes and errors.
+/// Measures how the right camera of a rig has turned since its calibration. Shocks and heat turn cameras by tenths of a degree; rows then
+/// no longer line up, and maps get holes and errors.
 ///
-/// rectification: that of the calibration. Raises ValueError of one by matches alone.
+/// rectification: that of the calibration. Raises ValueError for a rectification without a calibration.
 ///
-/// Give it each frame, and go on with what `correct` returns: what `mrfgs sequence --recalibrate` does.
+/// Pass it each frame, and continue with the result of `correct`, as `mrfgs sequence --recalibrate` does.
 #[pyclass(name = "Drift", frozen, module = "mrfgs")]
 pub(crate) struct PyDrift {
     calibrated: Py<PyRectification>,
@@ -31,10 +31,10 @@ impl PyDrift {
         Ok(Self { calibrated: rectification, drift: Turns::new(drift) })
     }
 
-    /// Takes the next frame. It looks at the first, the fourth, the sixteenth, and then at every 64th; of these the last 16 count.
+    /// Takes the next frame. It evaluates the first, fourth and sixteenth, then every 64th, and uses the last 16 of these.
     ///
-    /// left, right: the rectified views, by what `correct` returned last; before that by the rectification of the calibration.
-    /// max_disparity, min_disparity: the disparities that they have, in pixels; None is 0 for min_disparity.
+    /// left, right: the views, rectified by the last result of `correct`, or before that by the rectification of the calibration.
+    /// max_disparity, min_disparity: the range of their disparities, in pixels; min_disparity defaults to 0.
     #[pyo3(signature = (left, right, max_disparity, *, min_disparity=None))]
     fn follow(
         &self,
@@ -52,10 +52,9 @@ impl PyDrift {
         py.detach(|| self.drift.turn()?.follow(&pair, range)).map_err(exception)
     }
 
-    /// How the right camera has turned since the calibration, as far as the last frames show it; None where they have too few matches. A
-    /// dictionary: how far it looks up, to the right and clockwise, and the standard errors of these (`degrees`, `errors`), how far that
-    /// moves `rows` apart at most (pixels), how many `matches` show it, and whether it `counts`: it moves rows by 0.1 px or more, and
-    /// is no chance.
+    /// How the right camera has turned since the calibration, according to the last frames; None if they have too few matches. A
+    /// dictionary: the turn up, right and clockwise (`degrees`) and its standard errors (`errors`), the largest resulting shift of `rows`
+    /// (pixels), the number of `matches`, and whether the turn `counts`: it shifts rows by at least 0.1 px and is significant.
     #[getter]
     fn turn<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let turn = py.detach(|| Ok(self.drift.turn()?.turn())).map_err(exception)?;
@@ -69,8 +68,8 @@ impl PyDrift {
         Ok(Some(all))
     }
 
-    /// The Rectification of the next frames, where that is no longer what rectified the last ones; else None. It is that of the calibration
-    /// with the right camera turned; its `rig` is the same.
+    /// The Rectification for the next frames, if it differs from the last one; else None. It is that of the calibration with the right
+    /// camera turned, and has the same `rig`.
     fn correct(&self, py: Python) -> PyResult<Option<PyRectification>> {
         let calibrated = self.calibrated.get();
         let axis = py.detach(|| {

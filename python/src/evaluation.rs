@@ -1,4 +1,4 @@
-//! Maps against the truth.
+//! Evaluation of maps against the ground truth.
 
 use std::path::PathBuf;
 
@@ -11,13 +11,13 @@ use pyo3::types::PyDict;
 use crate::arrays;
 use crate::exceptions::exception;
 
-/// Reads a disparity map: one of this or of another matcher, or the truth.
+/// Reads a disparity map, of any matcher or a ground truth.
 ///
-/// path: a PFM or a TIFF of floats, in pixels; or a PNG of 16 bits as KITTI has it, with disparity times 256 and 0 where there is none.
-///     The scale in the header of a PFM does not count, as in Middlebury's files; cv2.imread multiplies by it.
+/// path: a PFM or float TIFF in pixels, or a 16-bit PNG as in KITTI, with disparity times 256 and 0 for unknown. The scale in the header of
+///     a PFM is ignored, as in Middlebury's files; cv2.imread multiplies by it.
 ///
-/// Returns an array of shape (height, width), float32, in pixels; +inf where there is no disparity. Raises
-/// FileNotFoundError where there is no such file, and ValueError where it holds no disparities.
+/// Returns a float32 array of shape (height, width), in pixels; +inf if unknown. Raises FileNotFoundError if the file does not exist, and
+/// ValueError if it does not contain disparities.
 #[pyfunction]
 #[pyo3(signature = (path, /))]
 pub(crate) fn read_disparity(py: Python, path: PathBuf) -> PyResult<Bound<PyArray2<f32>>> {
@@ -25,14 +25,14 @@ pub(crate) fn read_disparity(py: Python, path: PathBuf) -> PyResult<Bound<PyArra
     arrays::map(py, map)
 }
 
-/// Reads an image as `match` takes it: PNG, JPEG, PNM, TIFF or PFM, as the program reads it.
+/// Reads an image for `match`: PNG, JPEG, PNM, TIFF or PFM, as the program reads it.
 ///
 /// path: the file.
-/// orient: whether to turn it upright that is stored turned, as the tag of EXIF or TIFF says; a rectified pair is as it is stored.
+/// orient: whether to rotate it upright according to its EXIF or TIFF orientation tag; leave rectified pairs as stored.
 ///
-/// Returns an array of shape (height, width), or (height, width, channels) of grey and alpha, RGB, or RGB and alpha: uint8 for up to 8 bits,
-/// uint16 for 9 to 16, float32 and float64 for floats, and float64 for wider or signed whole numbers. Where a TIFF file says that a pixel
-/// holds no data, it is a masked array. Raises FileNotFoundError where there is no such file, and ValueError where it is no image.
+/// Returns an array of shape (height, width), or (height, width, channels) with grey and alpha, RGB, or RGBA: uint8 for up to 8 bits,
+/// uint16 for 9 to 16, float32 and float64 for floats, and float64 for wider or signed integers; a masked array if a TIFF file marks pixels
+/// as no data. Raises FileNotFoundError if the file does not exist, and ValueError if it is not an image.
 #[pyfunction]
 #[pyo3(signature = (path, /, *, orient=false))]
 pub(crate) fn read_image(py: Python, path: PathBuf, orient: bool) -> PyResult<Bound<PyAny>> {
@@ -40,25 +40,24 @@ pub(crate) fn read_image(py: Python, path: PathBuf, orient: bool) -> PyResult<Bo
     arrays::stored(py, &raster)
 }
 
-/// Compares a disparity map with the truth, as `mrfgs evaluate map` does.
+/// Compares a disparity map with the ground truth, as `mrfgs evaluate map` does.
 ///
-/// disparity: array of shape (height, width), float32 or float64, in pixels; what is not finite or masked is invalid. It may be of any
-///     matcher.
-/// truth: the true disparities, an array of the same kind and shape; what is not finite or masked is unknown and does not count.
-/// mask: array of the same shape that says which pixels both views see: bool, or uint8 that is 255 there, as in mask0nocc.png.
+/// disparity: array of shape (height, width), float32 or float64, in pixels, from any matcher; masked and non-finite pixels are invalid.
+/// truth: the true disparities, an array of the same shape; masked and non-finite pixels are unknown and do not count.
+/// mask: array of the same shape that marks pixels seen by both views: bool, or uint8 with 255 there, as in mask0nocc.png.
 ///
-/// Returns a dict of two dicts. "all" is over every pixel whose truth is known; "nonocc" over those of them that both views see, or None
-/// without a mask, or where no such pixel is left. Each holds
+/// Returns a dict of two dicts: "all" for every pixel with known truth, and "nonocc" for those seen by both views, or None without a mask
+/// or without such pixels. Each contains
 ///
-/// pixels: how many pixels count,
-/// density: the share of them that is valid, in percent,
-/// avg, rms: mean and root mean square of the error of the valid ones, in pixels,
-/// psnr: 10 log10(255^2 / MSE) of the valid ones, in dB,
-/// bad0.5, bad1.0, bad2.0, bad4.0: the share of pixels that are wrong by more than so many pixels or invalid, in percent,
-/// a50, a90, a95, a99: the error that so many percent of the valid pixels stay below, in pixels.
+/// pixels: the number of pixels,
+/// density: the share of valid pixels, in percent,
+/// avg, rms: mean and root mean square of the errors of valid pixels, in pixels,
+/// psnr: 10 log10(255^2 / MSE) of valid pixels, in dB,
+/// bad0.5, bad1.0, bad2.0, bad4.0: the share of pixels wrong by more than this many pixels or invalid, in percent,
+/// a50, a90, a95, a99: the error that this percentage of valid pixels stays below, in pixels.
 ///
-/// A figure that does not exist is None: all errors where no pixel is valid, and the PSNR of a perfect map. Raises ValueError where sizes
-/// differ or no truth is known, and TypeError for arrays of other types.
+/// Undefined figures are None: all errors without valid pixels, and the PSNR of a perfect map. Raises ValueError if sizes differ or no
+/// truth is known, and TypeError for arrays of other types.
 #[pyfunction]
 #[pyo3(signature = (disparity, truth, mask=None))]
 pub(crate) fn evaluate<'py>(
@@ -77,7 +76,7 @@ pub(crate) fn evaluate<'py>(
     Ok(found)
 }
 
-/// The figures by the names that they have in the program's JSON.
+/// The figures, with the names of the program's JSON.
 fn figures<'py>(py: Python<'py>, metrics: &Metrics) -> PyResult<Bound<'py, PyDict>> {
     let found = PyDict::new(py);
     found.set_item("pixels", metrics.pixels)?;

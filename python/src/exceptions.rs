@@ -1,4 +1,4 @@
-//! What Python is told where something goes wrong.
+//! Exceptions and warnings for Python.
 
 use std::error::Error as _;
 use std::ffi::CString;
@@ -19,10 +19,10 @@ pyo3::create_exception!(
     mrfgs,
     MatchWarning,
     PyUserWarning,
-    "What is probably wrong with a pair, or with the range of disparities that was searched, and what to do about it."
+    "A probable fault of a pair or of the disparity range, and its remedy."
 );
 
-/// The exception that says what went wrong, in the words of Python.
+/// Converts an error to an exception, with remedies for Python.
 pub(crate) fn exception(error: Error) -> PyErr {
     let text = words::error(&error);
     match error {
@@ -37,7 +37,7 @@ pub(crate) fn exception(error: Error) -> PyErr {
     }
 }
 
-/// `instead` of an exception, which becomes its cause; but not of Ctrl-C and the like, which may come while Python runs anything.
+/// Raises `instead` of an exception, with that as its cause, but lets Ctrl-C and the like through, which may come at any time.
 pub(crate) fn instead(py: Python, error: PyErr, instead: PyErr) -> PyErr {
     if !error.is_instance_of::<PyException>(py) {
         return error;
@@ -46,18 +46,18 @@ pub(crate) fn instead(py: Python, error: PyErr, instead: PyErr) -> PyErr {
     instead
 }
 
-/// Whether the system says that there is no such file.
+/// Whether the system reports that a file does not exist.
 fn is_missing(cause: Option<&(dyn std::error::Error + 'static)>) -> bool {
     let of_system = cause.and_then(|cause| cause.downcast_ref::<io::Error>());
     of_system.is_some_and(|error| error.kind() == io::ErrorKind::NotFound)
 }
 
-/// Says what is probably wrong, at the line of Python that called.
+/// Issues warnings at the calling line of Python.
 pub(crate) fn warn(py: Python, warnings: impl IntoIterator<Item = Warning>) -> PyResult<()> {
     tell(py, warnings.into_iter().map(|warning| words::warning(&warning)))
 }
 
-/// Says these lines as warnings.
+/// Issues these lines as warnings.
 pub(crate) fn tell(py: Python, lines: impl IntoIterator<Item = String>) -> PyResult<()> {
     for line in lines {
         let text = CString::new(line)?;

@@ -1,4 +1,4 @@
-//! The Python module `mrfgs._mrfgs`: arrays in, the crate `mrfgs`, arrays out.
+//! The Python module `mrfgs._mrfgs`: arrays in, arrays out, with the crate `mrfgs` in between.
 
 mod arrays;
 mod calibration;
@@ -21,8 +21,8 @@ use pyo3::prelude::*;
 
 #[pymodule]
 fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
-    // The crate `numpy` finds numpy when it is used first, and panics where Ctrl-C comes in between: so it finds it here.
-    // The same for its masked arrays: Python 3.9 and 3.10 end by a Ctrl-C that interrupts a first import, even where it was caught.
+    // Import numpy now: the crate `numpy` imports it on first use and panics if Ctrl-C interrupts that. numpy.ma too, as Python 3.9 and
+    // 3.10 exit if Ctrl-C interrupts a first import, even if it is caught.
     module.py().import("numpy.ma")?;
     let _ = PyArray1::<u8>::zeros(module.py(), 0, false).readonly();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

@@ -1,4 +1,4 @@
-//! The maps of a pair, and what made them.
+//! The maps of a pair.
 
 use mrfgs::Matched;
 use mrfgs::image::Plane;
@@ -10,36 +10,36 @@ use pyo3::types::{PyTuple, PyType};
 
 use crate::{arrays, words};
 
-/// The maps of a pair, and what made them. All maps have the shape (height, width) of the images.
+/// The maps of a pair, of shape (height, width), and how they were computed.
 #[pyclass(name = "Matched", frozen, get_all, module = "mrfgs")]
 pub(crate) struct PyMatched {
-    /// Disparity in pixels, float32, +inf where there is none.
+    /// Disparity in pixels, float32, +inf if unknown.
     pub(crate) disparity: Py<PyArray2<f32>>,
     /// Disparity before post-processing in pixels, float32, +inf where the left image is masked.
     raw: Py<PyArray2<f32>>,
-    /// How far the best runner-up is behind, in 1/8 nat, uint8, as a mean over the pixels around; those with another disparity count
-    /// 0. It is 0 where there is no measurement.
+    /// How sure each pixel is, uint8: the lead of the best disparity over the runner-up in 1/8 nat, averaged over neighbouring pixels
+    /// (those with another disparity count 0). 0 for pixels without a measurement.
     pub(crate) confidence: Py<PyArray2<u8>>,
-    /// The error to expect of every measured disparity in pixels, float32, from its confidence: about two thirds are nearer to the truth.
-    /// +inf where nothing was measured.
+    /// The expected error of every measured disparity in pixels, float32, from its confidence: about two thirds of the errors are smaller.
+    /// +inf for pixels without a measurement.
     pub(crate) sigma: Py<PyArray2<f32>>,
-    /// Why each pixel is what it is, uint8: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
-    /// confidence, 16 filled, 32 masked, 64 a tie of two disparities, 128 outvoted by the pixels around it; 0 is measured and trusted.
+    /// The status of each pixel, uint8: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low confidence, 16
+    /// filled, 32 masked, 64 a tie of two disparities, 128 outvoted by neighbouring pixels; 0 is measured and trusted.
     pub(crate) validity: Py<PyArray2<u8>>,
-    /// Disparity of the right view in pixels, float32, +inf where there is none: right (x, y) with disparity d is seen at left
-    /// (x + d, y). None unless the option "right-map" asks for it.
+    /// Disparity of the right view in pixels, float32, +inf if unknown: right (x, y) with disparity d appears at left (x + d, y). None
+    /// without the option "right-map".
     right: Option<Py<PyArray2<f32>>>,
     /// Smallest disparity that was searched, in pixels.
     min_disparity: i32,
     /// Largest disparity that was searched, in pixels.
     max_disparity: i32,
-    /// Iterations done, of all phases together.
+    /// Number of iterations, over all phases.
     iterations: u32,
-    /// Tiles that the image was matched in.
+    /// Number of tiles that the image was split into.
     tiles: usize,
-    /// What ran it.
+    /// The device.
     ran_on: String,
-    /// Why that is not the device that was hoped for, where that is so; else None.
+    /// Why the preferred device was not used, else None.
     note: Option<String>,
 }
 
@@ -64,7 +64,7 @@ impl PyMatched {
         })
     }
 
-    /// The maps as the arrays hold them now; there may be no raw ones.
+    /// The maps with the arrays' current values; `raw` is not included.
     pub(crate) fn maps(&self, py: Python) -> PyResult<Maps> {
         let disparity = arrays::disparities("matched.disparity", self.disparity.bind(py).as_any())?;
         let confidence = arrays::bytes("matched.confidence", self.confidence.bind(py).as_any())?;
@@ -72,13 +72,13 @@ impl PyMatched {
         let size = disparity.size();
         if [confidence.size(), validity.size()] != [size; 2] {
             return Err(PyValueError::new_err(
-                "matched: its maps differ in size; give what a match has returned",
+                "matched: its maps differ in size; give the result of a match",
             ));
         }
         Ok(Maps::from_pixels(&disparity, confidence, validity))
     }
 
-    /// The same with other disparities.
+    /// A copy with other disparities.
     pub(crate) fn with_disparity(&self, py: Python, disparity: Plane<f32>) -> PyResult<Self> {
         Ok(Self {
             disparity: arrays::map(py, disparity)?.unbind(),
@@ -97,7 +97,7 @@ impl PyMatched {
 #[pymethods]
 impl PyMatched {
     #[new]
-    #[allow(clippy::too_many_arguments, reason = "what it is made of")]
+    #[allow(clippy::too_many_arguments, reason = "its fields")]
     fn new(
         disparity: Py<PyArray2<f32>>,
         raw: Py<PyArray2<f32>>,
@@ -128,7 +128,7 @@ impl PyMatched {
         }
     }
 
-    /// How `pickle` and `copy` make another one.
+    /// Supports `pickle` and `copy`.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Bound<'py, PyTuple>)> {
         let (d, r, c) = (self.disparity.bind(py), self.raw.bind(py), self.confidence.bind(py));
         let (s, v) = (self.sigma.bind(py), self.validity.bind(py));

@@ -18,17 +18,17 @@ use crate::matched::PyMatched;
 use crate::sequence::{PATIENCE, PyMatchedSequence, Settings, Shared};
 use crate::{options, range};
 
-/// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
+/// Matches pairs, keeping the device, its compiled shaders and its buffers in between.
 ///
-/// device: "auto", which None stands for, takes a GPU where there is one, else the CPU; "cpu" takes the CPU; "gpu" takes a GPU or any
-///     Vulkan or Metal driver, and raises RuntimeError where there is none; anything else is the index of a device, such as 0, or a
-///     part of its name, as `mrfgs devices` lists them. The maps are the same, bit for bit.
-/// threads: the most threads that a match and its checks take on the CPU, 1 to 1024. None takes as many as processors that the process
-///     may use, by affinity and cgroups, or fewer where RAYON_NUM_THREADS, OMP_NUM_THREADS, SLURM_CPUS_PER_TASK or SLURM_CPUS_ON_NODE
-///     is a smaller number.
+/// device: "auto", the default, uses a GPU if there is one, else the CPU; "cpu" uses the CPU; "gpu" uses a GPU or any Vulkan or Metal
+///     driver, and raises RuntimeError without one; anything else is the index of a device, such as 0, or part of its name, as listed by
+///     `mrfgs devices`. The maps are bit for bit the same.
+/// threads: maximum number of CPU threads of a match and its checks, 1 to 1024. The default is the number of processors available to the
+///     process (affinity, cgroups), or the smallest of RAYON_NUM_THREADS, OMP_NUM_THREADS, SLURM_CPUS_PER_TASK and SLURM_CPUS_ON_NODE if
+///     lower.
 ///
-/// Threads may share a Matcher: their matches take turns. A process that is forked may use those of its parent on the CPU. Devices do not
-/// come along: there "auto" takes the CPU, as Matched.note says, and "gpu" raises RuntimeError; start processes by "spawn" or "forkserver".
+/// Threads may share a Matcher; their matches take turns. A forked process may use its parent's Matcher on the CPU, but not devices: there
+/// "auto" uses the CPU, as Matched.note says, and "gpu" raises RuntimeError; start processes with "spawn" or "forkserver" instead.
 #[pyclass(name = "Matcher", frozen, module = "mrfgs")]
 pub(crate) struct PyMatcher(Shared);
 
@@ -39,36 +39,37 @@ impl PyMatcher {
     fn new(py: Python, device: Option<&Bound<PyAny>>, threads: Option<&Bound<PyAny>>) -> PyResult<Self> {
         let builder = Matcher::builder().execution(options::execution(device, threads)?);
         let matcher = py.detach(|| SharedMatcher::new(builder)).map_err(exception)?;
-        // To open a device takes a while.
+        // Opening a device takes a while.
         py.check_signals()?;
         Ok(Self(Shared { matcher: Arc::new(matcher), taken: Arc::new(AtomicU32::new(0)) }))
     }
 
     /// Matches a rectified pair, and returns its maps as a Matched.
     ///
-    /// left, right: arrays of shape (height, width) or (height, width, channels): grey, grey and alpha, RGB or RGBA, of uint8,
-    ///     uint16, float32 or float64, in any layout. Left (x, y) with disparity d is seen at right (x - d, y). 8 bits are taken as
-    ///     they are; 16 bits fill their range with the largest value of both; floats run from the least to the largest value of
-    ///     both. Where one view has 8 bits and the other one 16, each fills its range. Whole numbers of other types, such as int64,
-    ///     are 8 bits where those of both views are 0 to 255, and 16 bits where they are 0 to 65535; others raise ValueError, because
-    ///     they may mean anything. Ignored are pixels of alpha 0, values that are not finite, and what a masked array masks.
-    /// max_disparity, min_disparity: the range to search in whole pixels, both ends included. Without max_disparity sparse matches
-    ///     find the range, and where the scene goes beyond it the pair is matched once more, over half as many labels more; min_disparity is 0 where max_disparity is given alone.
-    /// mask: array of shape (height, width): where it is not 0 the left image is ignored, and the maps are invalid.
-    /// no_data: a value that stands for no data: pixels with it in every channel are ignored, in both images.
-    /// roi: (x, y, width, height) of a part of the left image in pixels, which alone is matched, in the time of that part; the maps have
-    ///     its size. Rig.of_part gives its depths and points.
-    /// method: the name of a preset, which mrfgs.presets() lists with what each is for, or the path of a TOML file whose keys replace those
-    ///     of the preset "default"; None takes that preset.
-    /// options: options that replace those of the method, such as {"fill": "none", "memory": 2048}; mrfgs.options() describes all. A
-    ///     key may have its group in front, "refinement.fill", and a group may be a dict, {"refinement": {"fill": "none"}}.
-    /// memory: the memory that a match may take, such as "2GiB" or "512MiB"; a pair that needs more is matched in tiles. None takes that
-    ///     of the method.
-    /// warn: whether to look for what is probably wrong (views swapped, turned, not rectified or of two scenes, a range that cuts off
-    ///     part of the scene), and to tell it as a MatchWarning. It takes a part of the time of a match.
+    /// left, right: arrays of shape (height, width) or (height, width, channels): grey, grey and alpha, RGB or RGBA, of uint8, uint16,
+    ///     float32 or float64, in any layout. Left (x, y) with disparity d appears at right (x - d, y). 8 bits are used unchanged; 16 bits
+    ///     are scaled by the largest value of both views; floats are scaled from the smallest to the largest value of both. If one view has
+    ///     8 bits and the other 16, each is scaled on its own. Integers of other types, such as int64, count as 8 bits if all values of
+    ///     both views are 0 to 255, and as 16 bits if they are 0 to 65535; others raise ValueError, as their meaning is unknown. Pixels
+    ///     with alpha 0, non-finite values or a mask are ignored.
+    /// max_disparity, min_disparity: the range to search in whole pixels, inclusive. Without max_disparity it is estimated from sparse
+    ///     matches, and if the scene exceeds it the pair is matched again with half as many labels more; min_disparity defaults to 0 if
+    ///     max_disparity is given.
+    /// mask: array of shape (height, width): nonzero pixels of the left image are ignored, and invalid in the maps.
+    /// no_data: a value for no data: pixels that have it in every channel are ignored, in both images.
+    /// roi: (x, y, width, height) of a region of the left image in pixels; only that is matched, in proportionally less time, and the maps
+    ///     have its size. Rig.of_part gives its depths and points.
+    /// method: the name of a preset (see mrfgs.presets()), or the path of a TOML file that overrides keys of the preset "default"; the
+    ///     default is that preset.
+    /// options: options that override the method, such as {"fill": "none", "memory": 2048}; see mrfgs.options(). A key may include its
+    ///     group, "refinement.fill", or a group may be a dict, {"refinement": {"fill": "none"}}.
+    /// memory: memory limit of a match, such as "2GiB" or "512MiB"; a pair that needs more is matched in tiles. The default is that of the
+    ///     method.
+    /// warn: whether to check for probable faults (views swapped, turned, not rectified or of different scenes, a range that clips the
+    ///     scene) and issue a MatchWarning. The check takes a fraction of the time of a match.
     ///
-    /// Other threads run meanwhile; Ctrl-C ends it. Raises ValueError for what makes no sense, TypeError for other arrays,
-    /// RuntimeError where the wanted device fails, and MemoryError where it does not fit.
+    /// Other threads keep running, and Ctrl-C interrupts it. Raises ValueError for invalid arguments, TypeError for unsupported arrays,
+    /// RuntimeError if the selected device fails, and MemoryError if memory is too small.
     #[pyo3(
         name = "match",
         signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, roi=None, method=None,
@@ -125,17 +126,17 @@ impl PyMatcher {
         PyMatched::of(py, matched)
     }
 
-    /// Matches pair after pair, and returns an iterator that yields the Matched of each, in order. While a device is at one pair the next
-    /// one goes up and the maps of the last one come down.
+    /// Matches pair after pair, and returns an iterator that yields a Matched for each, in order. On a device, uploading the next pair and
+    /// downloading the last maps overlap with matching.
     ///
-    /// pairs: an iterable of pairs (left, right) of arrays as `match` takes them, such as a list, a generator, or
-    ///     map(rectification.apply, lefts, rights). Up to three pairs are under way at a time, so a result comes when two more pairs
-    ///     have been taken. The arrays of a pair may be used again for the next one.
+    /// pairs: an iterable of pairs (left, right) of arrays as for `match`, such as a list, a generator, or map(rectification.apply, lefts,
+    ///     rights). Up to three pairs are in flight, so a result appears after two more pairs have been consumed. The arrays of a pair may
+    ///     be reused for the next one.
     ///
-    /// The other arguments are those of `match`, for all pairs; masked arrays tell what to ignore in each. The pairs are taken, and
-    /// exceptions raised, in the thread that asks for results. An exception of `pairs`, or of a pair that makes no sense, comes after the
-    /// results of the pairs before it; messages count pairs from 0. Ctrl-C ends the sequence. So does `close()` of the iterator, which
-    /// happens by itself when nothing refers to it any more. Until its end, the Matcher raises RuntimeError for other matches.
+    /// The other arguments are those of `match`, for all pairs; use masked arrays to ignore pixels. Pairs are consumed, and exceptions
+    /// raised, in the thread that asks for results. An exception from `pairs`, or about an invalid pair, comes after the results of earlier
+    /// pairs; messages number pairs from 0. Ctrl-C ends the sequence, as does `close()` of the iterator, which is automatic once nothing
+    /// refers to it. Until then the Matcher raises RuntimeError for other matches.
     #[pyo3(signature = (pairs, max_disparity=None, *, min_disparity=None, no_data=None, method=None, options=None, memory=None, warn=true))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn match_all(
@@ -160,10 +161,10 @@ impl PyMatcher {
     }
 }
 
-/// Matches one rectified pair, and returns its maps as a Matched.
+/// Matches a single rectified pair, and returns its maps as a Matched.
 ///
-/// It takes the arguments of Matcher.match, and those of Matcher; see help(mrfgs.Matcher). To match many pairs, keep a Matcher:
-/// it opens the device once.
+/// It takes the arguments of Matcher.match and of Matcher; see help(mrfgs.Matcher). For many pairs use a Matcher, which opens the device
+/// once.
 #[pyfunction]
 #[pyo3(
     name = "match",
@@ -207,22 +208,22 @@ pub(crate) fn match_(
 /// The region (x, y, width, height) of the left view of `pair`.
 fn region(given: &Bound<PyAny>, pair: &Pair, range: DisparityRange) -> PyResult<Region> {
     let [x, y, width, height]: [usize; 4] = given.extract().map_err(|error| {
-        let reason = "roi: give (x, y, width, height), four whole numbers of pixels from 0 on";
+        let reason = "roi: give (x, y, width, height), four integers of at least 0";
         exceptions::instead(given.py(), error, PyTypeError::new_err(reason))
     })?;
     let part = Rect { x: x..x.saturating_add(width), y: y..y.saturating_add(height) };
     Region::new(part, pair.size(), range).map_err(|error| PyValueError::new_err(format!("roi: {error}")))
 }
 
-/// Does `run` on a thread of its own, while this one, to which alone Python tells of Ctrl-C, looks for that.
+/// Runs the match on another thread while this one checks for Ctrl-C, as Python reports that only to its main thread.
 fn interruptible(run: impl FnOnce(&AtomicBool) -> mrfgs::Result<Matched> + Send) -> PyResult<Matched> {
     let stop = AtomicBool::new(false);
     let (sender, receiver) = mpsc::channel();
     thread::scope(|scope| {
         let stop = &stop;
-        // The sender goes with the thread, however that ends.
+        // The sender is dropped with the thread, however it ends.
         scope.spawn(move || {
-            // Somebody waits for it until it is here.
+            // The receiver outlives this send, so it cannot fail.
             let _ = sender.send(run(stop));
         });
         let mut signal = Ok(());
@@ -235,7 +236,7 @@ fn interruptible(run: impl FnOnce(&AtomicBool) -> mrfgs::Result<Matched> + Send)
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Err(PyRuntimeError::new_err("the match panicked, which is a defect of mrfgs"));
+                    return Err(PyRuntimeError::new_err("the match panicked, which is a bug in mrfgs"));
                 }
             }
         }

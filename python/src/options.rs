@@ -9,7 +9,7 @@ use pyo3::types::{PyBool, PyDict, PyInt, PyString};
 
 use crate::exceptions::{self, exception};
 
-/// The method: a preset or a file, what replaces some of its keys, and the memory.
+/// The method: a preset or a file, overridden by options and a memory limit.
 pub(crate) fn method(
     method: Option<&Bound<PyAny>>,
     options: Option<&Bound<PyAny>>,
@@ -43,7 +43,7 @@ pub(crate) fn method(
     Ok(found)
 }
 
-/// The preset with a name, or the preset "default" with the keys of a file in the place of its own.
+/// The preset of this name, or the preset "default" overridden by a file.
 fn named(given: &Bound<PyAny>) -> PyResult<Method> {
     let path: PathBuf = given.extract().map_err(|error| {
         let reason = "method: give the name of a preset, or the path of a TOML file";
@@ -55,7 +55,7 @@ fn named(given: &Bound<PyAny>) -> PyResult<Method> {
     if path.extension().is_none_or(|extension| extension != "toml") && !path.exists() {
         let names: Vec<_> = PRESETS.iter().map(|preset| preset.name).collect();
         return Err(PyValueError::new_err(format!(
-            "method: there is no preset {}, and no such file; give one of {}, or the path of a TOML file",
+            "method: {} is neither a preset nor a file; give one of {}, or the path of a TOML file",
             quoted(given),
             names.join(", ")
         )));
@@ -65,7 +65,7 @@ fn named(given: &Bound<PyAny>) -> PyResult<Method> {
     Ok(method)
 }
 
-/// Where and how a match runs.
+/// Where a match runs.
 pub(crate) fn execution(
     device: Option<&Bound<PyAny>>,
     threads: Option<&Bound<PyAny>>,
@@ -75,7 +75,7 @@ pub(crate) fn execution(
     Ok(Execution { device, threads, ..Execution::default() })
 }
 
-/// The device with a name or an index.
+/// The device of this name or index.
 fn device(given: &Bound<PyAny>) -> PyResult<DeviceChoice> {
     if let Ok(name) = given.cast::<PyString>() {
         return Ok((&*name.to_cow()?).into());
@@ -85,28 +85,28 @@ fn device(given: &Bound<PyAny>) -> PyResult<DeviceChoice> {
         .map(|index| DeviceChoice::Named(index.to_string()))
         .ok_or_else(|| {
             PyTypeError::new_err(format!(
-                "device: give \"auto\", \"cpu\", \"gpu\", or the index of a device or a part of its name, not {}",
+                "device: give \"auto\", \"cpu\", \"gpu\", or the index of a device or part of its name, not {}",
                 quoted(given)
             ))
         })
 }
 
-/// The number of threads; the library refuses those that there may not be.
+/// The number of threads; the library checks its range.
 fn threads(given: &Bound<PyAny>) -> PyResult<usize> {
     let most = Execution::MOST_THREADS;
-    let expected = || format!("threads: give a whole number, 1 to {most}, or None, not {}", quoted(given));
+    let expected = || format!("threads: give an integer from 1 to {most}, or None, not {}", quoted(given));
     let number = whole(given).ok_or_else(|| PyTypeError::new_err(expected()))?;
     usize::try_from(number).map_err(|_| PyValueError::new_err(expected()))
 }
 
-/// A whole number, of any type that is one.
+/// Converts any integer type; `None` for other values.
 fn whole(given: &Bound<PyAny>) -> Option<i64> {
     let is_number = !given.is_instance_of::<PyBool>()
         && (given.is_instance_of::<PyInt>() || given.hasattr("__index__").is_ok_and(|has| has));
     is_number.then(|| given.extract().unwrap_or(i64::MAX))
 }
 
-/// What is given as a dict, for `argument`.
+/// Converts the argument `argument` to a dict.
 fn dict<'py>(argument: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
     let py = given.py();
     if let Ok(dict) = given.cast::<PyDict>() {
@@ -124,13 +124,13 @@ fn dict<'py>(argument: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, P
 /// A key of the dict `argument`.
 fn name(argument: &str, key: &Bound<PyAny>) -> PyResult<String> {
     let wrong = || {
-        let reason = "the keys are names of options, which mrfgs.options() describes, such as \"fill\"";
+        let reason = "keys must be names of options, such as \"fill\" (see mrfgs.options())";
         PyTypeError::new_err(format!("{argument}: {reason}, not {}", quoted(key)))
     };
     Ok(key.cast::<PyString>().map_err(|_| wrong())?.to_cow()?.into_owned())
 }
 
-/// What is given, as messages show it: in one short line.
+/// A short one-line repr for messages.
 fn quoted(given: &Bound<PyAny>) -> String {
     const MOST: usize = 60;
     let shown = given.repr().map_or_else(|_| "that".into(), |shown| shown.to_string());
@@ -138,7 +138,7 @@ fn quoted(given: &Bound<PyAny>) -> String {
     if line.chars().count() <= MOST { line } else { line.chars().take(MOST).chain("...".chars()).collect() }
 }
 
-/// The value of an option as the command line writes it.
+/// The value of an option in the syntax of the command line.
 fn as_written(value: &Bound<PyAny>) -> PyResult<String> {
     match value.extract::<bool>() {
         Ok(flag) => Ok(flag.to_string()),
@@ -146,13 +146,13 @@ fn as_written(value: &Bound<PyAny>) -> PyResult<String> {
     }
 }
 
-/// Describes the options: a dict from each group to a dict from each of its keys to a dict with
+/// Describes the options: a dict from each group to a dict from each key to a dict with
 ///
 /// meaning: what it does,
-/// takes: the unit and the range of its values,
-/// words: the words that it takes, with what each means; empty where it takes no words,
-/// source: the section of the paper that it comes from, or other work; "open" where the paper leaves the choice open,
-/// and, by the name of each preset, its value in that preset.
+/// takes: unit and range of its values,
+/// words: its keywords with their meanings; empty if it has none,
+/// source: the section of the paper that it comes from, or other work; "open" if the paper leaves the choice open,
+/// and its value in each preset, under the preset's name.
 #[pyfunction]
 pub(crate) fn options(py: Python) -> PyResult<Bound<PyDict>> {
     let groups = PyDict::new(py);
@@ -166,7 +166,7 @@ pub(crate) fn options(py: Python) -> PyResult<Bound<PyDict>> {
     Ok(groups)
 }
 
-/// Lists the presets: a dict from the name of each to what it is for.
+/// Lists the presets: a dict from each name to its purpose.
 #[pyfunction]
 pub(crate) fn presets(py: Python) -> PyResult<Bound<PyDict>> {
     let presets = PyDict::new(py);

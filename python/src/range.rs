@@ -1,4 +1,4 @@
-//! The disparities to search.
+//! The disparity range.
 
 use mrfgs::image::Pair;
 use mrfgs::options::{DisparityRange, MAX_DISPARITY};
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::exceptions::{self, exception};
 
-/// What is given for the disparity `name`: a whole number of pixels, of any type that holds one.
+/// Converts the disparity argument `name`: a whole number of pixels, of any numeric type.
 pub(crate) fn pixels(name: &str, given: Option<&Bound<PyAny>>) -> PyResult<Option<i32>> {
     let Some(given) = given else { return Ok(None) };
     let expected = format!("{name}: give a whole number of pixels within {MAX_DISPARITY} of 0");
@@ -18,7 +18,7 @@ pub(crate) fn pixels(name: &str, given: Option<&Bound<PyAny>>) -> PyResult<Optio
         exceptions::instead(given.py(), error, reason)
     };
     let number: f64 = given.extract().map_err(wrong)?;
-    // What is no number has no whole part.
+    // False for NaN and infinities, too.
     if number.trunc() == number && number.abs() <= f64::from(MAX_DISPARITY) {
         Ok(Some(number as i32))
     } else {
@@ -26,12 +26,12 @@ pub(crate) fn pixels(name: &str, given: Option<&Bound<PyAny>>) -> PyResult<Optio
     }
 }
 
-/// The range that is given.
+/// The range, if `max` is given.
 pub(crate) fn given(max: Option<i32>, min: Option<i32>) -> PyResult<Option<DisparityRange>> {
     max.map(|max| DisparityRange::new(min.unwrap_or(0), max)).transpose().map_err(exception)
 }
 
-/// The range to search: the one that is given, or that of sparse matches.
+/// The range to search: the given one, or one estimated from sparse matches.
 pub(crate) fn searched(
     py: Python,
     matcher: &SharedMatcher,
@@ -42,7 +42,7 @@ pub(crate) fn searched(
     given.map_or_else(|| py.detach(|| found(matcher, pair, min)), Ok)
 }
 
-/// The range that sparse matches find, from `min` on where that is given.
+/// The range estimated from sparse matches, starting at `min` if given.
 fn found(matcher: &SharedMatcher, pair: &Pair, min: Option<i32>) -> PyResult<DisparityRange> {
     let found = matcher.share(pair, || check::range(pair)).and_then(|found| found).map_err(exception)?;
     DisparityRange::new(min.unwrap_or(found.min), found.max).map_err(exception)

@@ -1,4 +1,4 @@
-//! Rectified pairs of what two cameras saw.
+//! Rectification of raw pairs.
 
 use std::sync::OnceLock;
 
@@ -15,31 +15,31 @@ use crate::depth::PyRig;
 use crate::exceptions::{self, exception};
 use crate::words;
 
-/// How images as the cameras took them become a rectified pair. It is found once, and applied to any number of pairs.
+/// Turns raw images into rectified pairs. It is computed once and applies to any number of pairs.
 ///
-/// calibration: a Calibration, the path of a calibration file, or a list of the paths of two.
-/// size: (width, height) of the images, in pixels; None takes that of the calibration, whose cameras may have images of two sizes.
-/// alpha: from 0, where every pixel of the rectified views has a source, to 1, where no pixel of the images is lost. None takes the
-///     rectification of the calibration where it has one, else one that keeps the focal length (fisheyes: 0).
-/// zero_disparity: whether both views have the same principal point, so that what is infinitely far has a disparity of 0.
+/// calibration: a Calibration, the path of a calibration file, or a list of two paths.
+/// size: (width, height) of the images, in pixels; None uses that of the calibration, which may differ between the cameras.
+/// alpha: from 0, where the rectified views have no empty borders, to 1, where they contain all pixels of the images. None uses the
+///     rectification in the calibration if there is one, else one that keeps the focal length (fisheyes: 0).
+/// zero_disparity: whether both views have the same principal point, so that points at infinity have disparity 0.
 ///
-/// The views are those of OpenCV's stereoRectify. Where one camera is above the other, both views are turned by a quarter, so that
-/// matches are on the same row. Raises ValueError for a calibration that gives no rectified pair, and for one of another size. What is
-/// probably wrong with it is told as a MatchWarning.
+/// The views are those of OpenCV's stereoRectify. If one camera is above the other, both views are rotated by 90 degrees so that matching
+/// points share a row. Raises ValueError for a calibration that gives no rectified pair or is for another size. Probable faults of the
+/// calibration are reported as a MatchWarning.
 #[pyclass(name = "Rectification", frozen, module = "mrfgs")]
 pub(crate) struct PyRectification {
     by: Rectification,
-    /// The same with its places, from the first pair on.
+    /// A copy with cached source positions, from the first pair on.
     kept: OnceLock<Rectification>,
-    /// What it was made of, for copies: calibration or matches, the size of the images, and the options.
+    /// The arguments, for copies: calibration or matches, image sizes, and options.
     made_of: (Source, [(usize, usize); 2], Options),
-    /// How its right camera has turned since, one turn after the other.
+    /// The turns of the right camera since then, in order.
     turns: Vec<[f64; 3]>,
-    /// What is known of the rectified pair, unless it comes from matches alone.
+    /// Calibration and rig of the rectified pair; `None` without a calibration.
     known: Option<(Calibration, Py<PyRig>)>,
 }
 
-/// What a rectification follows from.
+/// The basis of a rectification.
 #[derive(Clone, FromPyObject, IntoPyObject)]
 #[allow(clippy::large_enum_variant, reason = "there is one for each rectification")]
 enum Source {
@@ -68,7 +68,7 @@ impl PyRectification {
         Ok(Self { by, kept: OnceLock::new(), made_of: (source, sizes, options), turns: Vec::new(), known })
     }
 
-    /// The same of a rig whose right camera has turned about this axis, as long as the angle.
+    /// A copy for a rig whose right camera has turned about `axis`, whose length is the angle.
     pub(crate) fn with_right_turned(&self, py: Python, axis: [f64; 3]) -> PyResult<Self> {
         let Self { by, made_of, turns, known, .. } = self;
         Ok(Self {
@@ -80,12 +80,12 @@ impl PyRectification {
         })
     }
 
-    /// The rectification of the library.
+    /// The library's rectification.
     pub(crate) fn by(&self) -> &Rectification {
         &self.by
     }
 
-    /// Many pairs may follow the first, so it finds out once where pixels come from.
+    /// Caches the source positions, as many pairs may follow the first.
     fn with_places(&self) -> mrfgs::Result<&Rectification> {
         if let Some(kept) = self.kept.get() {
             return Ok(kept);
@@ -95,11 +95,11 @@ impl PyRectification {
         Ok(self.kept.get_or_init(|| by))
     }
 
-    /// What takes a scale.
+    /// Calibration and rig, for everything that needs a scale.
     fn known(&self) -> PyResult<&(Calibration, Py<PyRig>)> {
         self.known.as_ref().ok_or_else(|| {
             PyValueError::new_err(
-                "the pair was rectified by its own matches, which show no scale; for depth, make a Rectification of a calibration",
+                "the pair was rectified without a calibration, so there is no scale; for depth, make a Rectification from a calibration",
             )
         })
     }
@@ -123,7 +123,7 @@ impl PyRectification {
             None => known.cameras.sizes().ok_or_else(|| {
                 let names = &known.names;
                 PyValueError::new_err(format!(
-                    "size: {names} does not say the size of the images; give (width, height)"
+                    "size: {names} lacks the size of the images; give (width, height)"
                 ))
             })?,
         };
@@ -134,17 +134,16 @@ impl PyRectification {
         Ok(made)
     }
 
-    /// The rectification of a pair by matches of its own, without a calibration: of two photographs of one camera that was moved to the
-    /// side by hand, and turned by some degrees at most.
+    /// Rectifies a pair from its own matches, without a calibration: two photos taken side by side with one hand-held camera, turned by a
+    /// few degrees at most.
     ///
-    /// left, right: arrays as `match` takes them, as they are seen: turn photographs upright by their EXIF orientation first.
-    /// mask: array of the shape (height, width) of left: where it is not 0 left is ignored.
-    /// no_data: a value that stands for no data in both images.
-    /// alpha, zero_disparity: as of Rectification.
+    /// left, right: arrays as for `match`, upright: rotate photos by their EXIF orientation first.
+    /// mask: array of shape (height, width): nonzero pixels of the left image are ignored.
+    /// no_data: a value for no data, in both images.
+    /// alpha, zero_disparity: as for Rectification.
     ///
-    /// `trust` says how far it can be trusted. There is no scale, so `rig` raises ValueError. Raises ValueError where too few matches
-    /// agree, where they show no depth (one flat surface, or a camera that turned on the spot), and where the camera moved forward. What
-    /// makes it doubtful is told as a MatchWarning.
+    /// `trust` tells how reliable it is. There is no scale, so `rig` raises ValueError. Raises ValueError if too few matches agree, if they
+    /// show no depth (a flat surface, or a camera that only turned), or if the camera moved forward. Doubts are reported as a MatchWarning.
     #[staticmethod]
     #[pyo3(signature = (left, right, *, mask=None, no_data=None, alpha=None, zero_disparity=true))]
     fn of_pair(
@@ -165,16 +164,16 @@ impl PyRectification {
         Ok(made)
     }
 
-    /// Rectifies a pair, and returns the left and the right view as masked arrays: masked where there is no source, or where the
-    /// source is ignored. `match` ignores such pixels; `.data` and `.mask` are plain arrays.
+    /// Rectifies a pair, and returns the left and the right view as masked arrays: masked where a pixel has no source or an ignored one.
+    /// `match` ignores masked pixels; `.data` and `.mask` are plain arrays.
     ///
-    /// left, right: arrays as `match` takes them, of the size of the rectification.
-    /// mask: array of the shape (height, width) of left: where it is not 0 left is ignored.
-    /// no_data: a value that stands for no data in both images.
+    /// left, right: arrays as for `match`, of the size of the rectification.
+    /// mask: array of shape (height, width): nonzero pixels of the left image are ignored.
+    /// no_data: a value for no data, in both images.
     ///
-    /// The views have shape (height, width) or (height, width, 3), and no alpha. Those of two uint8 images are uint8; all others are
-    /// uint16 and fill its range, as `match` takes them: the least to the largest value of floats are 0 to 65280. The values are those
-    /// of the files that `mrfgs rectify` writes. Raises ValueError for images of another size.
+    /// The views have shape (height, width) or (height, width, 3), without alpha. Two uint8 images give uint8 views; others give uint16
+    /// scaled as for `match`, floats from 0 to 65280. The values are those of the files that `mrfgs rectify` writes. Raises ValueError for
+    /// images of another size.
     #[pyo3(signature = (left, right, *, mask=None, no_data=None))]
     fn apply<'py>(
         &self,
@@ -192,8 +191,8 @@ impl PyRectification {
         Ok((left, right))
     }
 
-    /// Where each pixel of the rectified views is in the images: ((left_x, left_y), (right_x, right_y)), float32, in pixels, of shape
-    /// (height, width); +inf where it is nowhere. cv2.remap takes them. Raises MemoryError where they do not fit.
+    /// The source position of each pixel of the rectified views: ((left_x, left_y), (right_x, right_y)), float32, in pixels, of shape
+    /// (height, width); +inf without a source. Suitable for cv2.remap. Raises MemoryError if they do not fit.
     fn maps<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyTuple>)> {
         let [left, right] = py.detach(|| self.by.maps()).map_err(exception)?;
         let both = |[x, y]: [_; 2]| PyTuple::new(py, [arrays::map(py, x)?, arrays::map(py, y)?]);
@@ -206,28 +205,27 @@ impl PyRectification {
         self.by.size()
     }
 
-    /// (width, height) of the left images that it rectifies, in pixels; that of the right ones may be another.
+    /// (width, height) of the raw left images, in pixels; that of the right ones may differ.
     #[getter]
     fn raw_size(&self) -> (usize, usize) {
         self.made_of.1[0]
     }
 
-    /// The rotations from the frame of each camera to that of its rectified view: two arrays (3, 3), left and right, R1 and R2 of
-    /// OpenCV.
+    /// The rotations from each camera's frame to that of its rectified view: two arrays (3, 3), left and right, R1 and R2 in OpenCV.
     #[getter]
     fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         arrays::matrices(py, self.by.rotations())
     }
 
-    /// The cameras of the rectified pair, as a Rig: for depth and points. Raises ValueError of a rectification by matches alone.
+    /// The cameras of the rectified pair as a Rig, for depth and points. Raises ValueError without a calibration.
     #[getter]
     fn rig(&self, py: Python) -> PyResult<Py<PyRig>> {
         Ok(self.known()?.1.clone_ref(py))
     }
 
-    /// How far a rectification by matches alone can be trusted; None of one by a calibration. A dictionary: `matches`, how many of them
-    /// are `agreeing`, the `median` and `percentile95` of how far apart the rows of these are (pixels), their `coverage` of the image, and
-    /// the share of them that is `off_one_plane` (0 to 1).
+    /// How reliable a rectification without a calibration is; None with one. A dictionary: the number of `matches`, the number `agreeing`,
+    /// the `median` and `percentile95` of the row errors of these (pixels), their `coverage` of the image, and the share `off_one_plane` (0
+    /// to 1).
     #[getter]
     fn trust<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(trust) = self.by.trust() else { return Ok(None) };
@@ -241,14 +239,14 @@ impl PyRectification {
         Ok(Some(all))
     }
 
-    /// The calibration of the rectified pair in Middlebury's form, in millimetres where the unit is known: the text of calib.txt.
-    /// Raises ValueError of a rectification by matches alone.
+    /// The calibration of the rectified pair as the text of a Middlebury calib.txt, in millimetres if the unit is known. Raises ValueError
+    /// without a calibration.
     fn calib_txt(&self) -> PyResult<String> {
         Ok(write::middlebury(&self.known()?.0).unwrap_or_default())
     }
 
-    /// The same for OpenCV, in the unit of the calibration: the text of a YAML file with K1, D1, R1, P1, K2, D2, R2, P2, R, T, Q, and the
-    /// rotations as fromRaw1 and fromRaw2. Raises ValueError of a rectification by matches alone.
+    /// The calibration of the rectified pair as the text of an OpenCV YAML file, in the unit of the calibration: K1, D1, R1, P1, K2, D2,
+    /// R2, P2, R, T, Q, and the rotations fromRaw1 and fromRaw2. Raises ValueError without a calibration.
     fn cameras_yml(&self) -> PyResult<String> {
         Ok(write::opencv(&self.known()?.0, self.by.rotations()).unwrap_or_default())
     }
@@ -258,7 +256,7 @@ impl PyRectification {
         format!("<mrfgs.Rectification: {w} x {h} to {width} x {height}>")
     }
 
-    /// How `pickle` and `copy` make another one. It is found again: the same calibration or matches give the same bits everywhere.
+    /// Pickles the arguments: recomputing gives the same bits everywhere.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let (source, sizes, Options { alpha, zero_disparity }) = self.made_of.clone();
         let again = py.get_type::<Self>().getattr("_again")?;
@@ -266,7 +264,7 @@ impl PyRectification {
         Ok((again, (source, sizes, alpha, zero_disparity, turns).into_pyobject(py)?))
     }
 
-    /// As the constructor, without saying a second time what is probably wrong.
+    /// The constructor without repeated warnings.
     #[classmethod]
     fn _again(
         of: &Bound<PyType>,

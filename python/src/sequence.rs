@@ -1,4 +1,4 @@
-//! Pairs in sequence: an iterator of pairs in, one of results out, and a device that is kept busy in between.
+//! Matching of sequences: an iterator of pairs in, an iterator of results out, keeping the device busy.
 
 use std::process;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -20,22 +20,22 @@ use crate::exceptions::{self, exception};
 use crate::matched::PyMatched;
 use crate::range;
 
-/// How long a Ctrl-C may wait until somebody looks.
+/// Interval at which a wait checks for Ctrl-C.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Pairs that are taken before their results are asked for: one whose maps come down, one that is matched, and one that waits.
+/// Pairs consumed before their results are requested: one being downloaded, one being matched, one waiting.
 const AHEAD: usize = 3;
 
-/// The matcher that an iterator takes, and whether one has it.
+/// The matcher of iterators, and which process uses it.
 #[derive(Clone)]
 pub(crate) struct Shared {
     pub(crate) matcher: Arc<SharedMatcher>,
-    /// The process in which one has it; 0 where none does.
+    /// The process in which an iterator uses the matcher; 0 for none.
     pub(crate) taken: Arc<AtomicU32>,
 }
 
 impl Shared {
-    /// Refuses a matcher that is in the middle of a sequence: it would wait for pairs that nobody gives.
+    /// Refuses a matcher in the middle of a sequence, which would wait for pairs forever.
     pub(crate) fn check(&self) -> PyResult<()> {
         if self.taken.load(Ordering::Acquire) == process::id() {
             let reason = "this Matcher is in the middle of match_all; finish or close that iterator, or use another Matcher";
@@ -45,7 +45,7 @@ impl Shared {
     }
 }
 
-/// What holds for all pairs of a sequence.
+/// The settings of a sequence.
 pub(crate) struct Settings {
     pub(crate) method: Method,
     pub(crate) range: Option<DisparityRange>,
@@ -61,13 +61,13 @@ pub(crate) struct PyMatchedSequence(Mutex<State>);
 struct State {
     shared: Shared,
     settings: Settings,
-    /// `None` once it has no more pairs.
+    /// `None` after the last pair.
     pairs: Option<Py<PyIterator>>,
-    /// What ended it, told after the results of the pairs before.
+    /// The exception that ended the pairs, raised after the results of earlier pairs.
     failure: Option<PyErr>,
-    /// Pairs that went in, and results that came out.
+    /// Pairs consumed, and results returned.
     counts: [usize; 2],
-    /// From the first pair to the last result.
+    /// Exists from the first pair to the last result.
     worker: Option<Own<Worker>>,
     ended: bool,
 }
@@ -88,7 +88,7 @@ impl PyMatchedSequence {
     }
 
     fn __next__(&self, py: Python) -> PyResult<Option<PyMatched>> {
-        // Whoever waited here for another thread would keep Python from it.
+        // Waiting for another thread here would block it, as this one holds the interpreter.
         let mut state = self.0.try_lock().map_err(|_| in_use())?;
         let next = state.next(py);
         if !matches!(next, Ok(Some(_))) {
@@ -97,8 +97,8 @@ impl PyMatchedSequence {
         next
     }
 
-    /// Ends the sequence: stops the match that runs, takes no more pairs, and gives the matcher back. It happens by itself at the end of
-    /// the pairs, after an exception, and when nothing refers to the iterator any more.
+    /// Ends the sequence: stops the running match, consumes no more pairs, and releases the matcher. This is automatic after the last pair,
+    /// after an exception, and once nothing refers to the iterator.
     fn close(&self, py: Python) -> PyResult<()> {
         self.0.try_lock().map_err(|_| in_use())?.end(py);
         Ok(())
@@ -107,12 +107,12 @@ impl PyMatchedSequence {
 
 fn of_parent() -> PyErr {
     PyRuntimeError::new_err(
-        "this iterator was begun before the process was forked, and ends with that; call match_all here",
+        "this iterator belongs to the parent of this forked process; call match_all again here",
     )
 }
 
 fn in_use() -> PyErr {
-    PyValueError::new_err("this iterator is in use already, by another thread or by its own pairs")
+    PyValueError::new_err("this iterator is already in use, by another thread or by its own pairs")
 }
 
 impl State {
@@ -129,7 +129,7 @@ impl State {
             match self.take(py) {
                 Ok(Some(job)) => {
                     self.counts[0] += 1;
-                    // A worker that has ended says why below.
+                    // The error of an ended worker is raised below.
                     if !self.worker()?.send(job) {
                         self.pairs = None;
                     }
@@ -166,12 +166,12 @@ impl State {
         self.failure.take().map_or(Ok(None), Err)
     }
 
-    /// Who matches the pairs, in the process that asked for the first.
+    /// The worker, in the process that created it.
     fn worker(&self) -> PyResult<&Worker> {
         self.worker.as_ref().and_then(Own::get).ok_or_else(of_parent)
     }
 
-    /// The next pair, and where to search it.
+    /// The next pair and its range.
     fn take(&mut self, py: Python) -> PyResult<Option<(Pair, DisparityRange)>> {
         let Some(item) = self.pairs.as_ref().and_then(|pairs| pairs.bind(py).clone().next()) else {
             return Ok(None);
@@ -206,7 +206,7 @@ impl State {
     }
 }
 
-/// The same exception, of the pair with this index.
+/// Adds the index of the pair to an exception.
 fn numbered(py: Python, index: usize, error: PyErr) -> PyErr {
     let kind = error.get_type(py);
     let ours = [
@@ -223,7 +223,7 @@ fn numbered(py: Python, index: usize, error: PyErr) -> PyErr {
     numbered
 }
 
-/// A thread that matches what it gets.
+/// A thread that matches the pairs it receives.
 struct Worker {
     pairs: Option<SyncSender<(Pair, DisparityRange)>>,
     results: Receiver<Matched>,
@@ -251,23 +251,23 @@ impl Worker {
         Self { pairs: Some(pairs), results, thread: Some(thread), stop, taken }
     }
 
-    /// Whether it has taken a pair: there is always room for one, so it has unless it has ended.
+    /// Sends a pair, and returns whether the worker took it; there is always room, so it does unless it has ended.
     fn send(&self, job: (Pair, DisparityRange)) -> bool {
         self.pairs.as_ref().is_some_and(|pairs| pairs.send(job).is_ok())
     }
 
-    /// How it ended.
+    /// The result of the ended worker.
     fn result(&mut self) -> PyResult<()> {
         match self.thread.take().map(JoinHandle::join) {
             None | Some(Ok(Ok(()) | Err(Error::Interrupted))) => Ok(()),
             Some(Ok(Err(error))) => Err(exception(error)),
-            Some(Err(_)) => Err(PyRuntimeError::new_err("the match panicked, which is a defect of mrfgs")),
+            Some(Err(_)) => Err(PyRuntimeError::new_err("the match panicked, which is a bug in mrfgs")),
         }
     }
 }
 
 impl Drop for Worker {
-    /// Ends the thread, which needs nothing of Python, and waits until the matcher is free.
+    /// Ends the thread, which does not need Python, and waits until the matcher is free.
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         self.pairs = None;

@@ -1,4 +1,4 @@
-//! Video that holds still where the scene does.
+//! Temporal smoothing of video.
 
 use mrfgs::image::Pair;
 use mrfgs::low_level::process::Turns;
@@ -10,8 +10,8 @@ use crate::arrays::Image;
 use crate::exceptions::exception;
 use crate::matched::PyMatched;
 
-/// A filter for the maps of a sequence: where the left image does not change, the disparity follows that of the frames before, weighted by
-/// confidence, so that still surfaces flicker less. Where something moves, it is that of the frame alone.
+/// A filter for the maps of a sequence that steadies still surfaces: where the left image does not change, disparities are averaged with
+/// earlier frames, weighted by confidence. Moving regions keep the disparities of their own frame.
 #[pyclass(name = "Steady", frozen, module = "mrfgs")]
 #[derive(Default)]
 pub(crate) struct PySteady(Turns<Steady>);
@@ -23,11 +23,12 @@ impl PySteady {
         Self::default()
     }
 
-    /// The same Matched with disparities that follow those of the frames before: for images of 8 bits the maps of `mrfgs sequence
-    /// --steady`. Raw, confidence, sigma, validity and right stay those of the frame alone.
+    /// Returns a copy of `matched` with smoothed disparities; for 8-bit images they equal those of `mrfgs sequence --steady`. Raw,
+    /// confidence, sigma, validity and right are not smoothed.
     ///
-    /// matched: what the match of the next frame has returned. One of another size begins a new sequence.
-    /// left: the left image that was matched. Deeper ones are scaled by their own values, where the program looks at both views.
+    /// matched: the result for the next frame. Another image size starts a new sequence.
+    /// left: the left image that was matched. Images of more than 8 bits are scaled by their own values, unlike in the program, which uses
+    /// both views.
     fn follow(&self, py: Python, matched: &Bound<PyMatched>, left: &Bound<PyAny>) -> PyResult<PyMatched> {
         let matched = matched.get();
         let mut maps = matched.maps(py)?;
@@ -36,7 +37,7 @@ impl PySteady {
         if pair.size() != maps.disparity.size() {
             let ((width, height), (w, h)) = (maps.disparity.size(), pair.size());
             return Err(PyValueError::new_err(format!(
-                "left: is {w} x {h} and the maps are {width} x {height}; give the image that was matched"
+                "left: is {w} x {h} but the maps are {width} x {height}; give the image that was matched"
             )));
         }
         py.detach(|| {

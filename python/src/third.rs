@@ -1,4 +1,4 @@
-//! A camera beside the pair.
+//! A third camera.
 
 use std::path::{Path, PathBuf};
 
@@ -10,22 +10,22 @@ use pyo3::types::{PyTuple, PyType};
 
 use crate::exceptions::{self, exception};
 
-/// A camera beside the pair, such as the colour camera of a rig: `Rig.registered` gives depths in its view.
+/// A camera besides the pair, such as a colour camera; `Rig.registered` gives depths in its view.
 ///
-/// file: the path of a file that says its lens, its size and how it stands to the left camera: one camera by the names of OpenCV or ROS (K,
-///     D, R, T and image_size, where a point X in the frame of the left camera is R X + T in its own), the last camera of Kalibr's chain,
-///     or the camera of an OAK's calibration that is not one of its pair.
+/// file: the path of a file with its lens, image size and pose relative to the left camera: one camera with the names of OpenCV or ROS (K,
+///     D, R, T and image_size, where X in the frame of the left camera is R X + T in its own), the last camera of a Kalibr chain, or the
+///     camera of an OAK calibration that is not part of its pair.
 ///
-/// Raises FileNotFoundError for a file that is not there, and ValueError for one that makes no sense.
+/// Raises FileNotFoundError if the file does not exist, and ValueError if it is not valid.
 #[pyclass(name = "ThirdCamera", frozen, module = "mrfgs")]
 pub(crate) struct PyThirdCamera {
     pub(crate) camera: ThirdCamera,
-    /// What it was made of, for copies: the file, as messages name it, and its text.
+    /// The name and the text of the file, for copies.
     made_of: (String, String),
 }
 
 impl PyThirdCamera {
-    /// What is given for `camera`: one, or the path of its file.
+    /// Converts the argument `camera`: a ThirdCamera, or the path of its file.
     pub(crate) fn of(given: &Bound<PyAny>) -> PyResult<ThirdCamera> {
         if let Ok(camera) = given.cast::<Self>() {
             return Ok(camera.get().camera);
@@ -40,7 +40,7 @@ impl PyThirdCamera {
     fn read(path: &Path) -> PyResult<Self> {
         let name = path.display().to_string();
         if name.contains('\n') {
-            let reason = "file: give the path of a file; ThirdCamera.of_text takes what is in one";
+            let reason = "file: give the path of a file, or pass its content to ThirdCamera.of_text";
             return Err(PyValueError::new_err(reason));
         }
         if !path.exists() {
@@ -62,7 +62,7 @@ impl PyThirdCamera {
         Self::read(&file)
     }
 
-    /// The same of the text of such a file.
+    /// Reads it from the text of such a file.
     #[staticmethod]
     fn of_text(text: String) -> PyResult<Self> {
         Self::of_named("the text".into(), text)
@@ -74,7 +74,7 @@ impl PyThirdCamera {
         self.camera.size
     }
 
-    /// The unit of its distance from the left camera: "mm", "cm", "m", or "unknown", which is taken for that of the pair.
+    /// The unit of its distance to the left camera: "mm", "cm", "m", or "unknown", which means that of the pair.
     #[getter]
     fn unit(&self) -> &'static str {
         self.camera.unit.name()
@@ -85,7 +85,7 @@ impl PyThirdCamera {
         format!("<mrfgs.ThirdCamera: {}, {width} x {height}>", self.made_of.0)
     }
 
-    /// How `pickle` and `copy` make another one: of the text, as the file may be gone by then.
+    /// Pickles the text, as the file may no longer exist.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         Ok((py.get_type::<Self>().getattr("_again")?, self.made_of.clone().into_pyobject(py)?))
     }

@@ -1,4 +1,4 @@
-"""The Python package against the command line: the same pair gives the same bits. MRFGS is the program's path."""
+"""Compares the Python package with the command line: the results must be identical. MRFGS is the path of the program."""
 
 import ast
 import contextlib
@@ -36,7 +36,7 @@ CAMERAS = RAW / "cameras.yml"
 
 
 def pair(height=60, width=80, channels=3, seed=1):
-    """A textured pair: the upper half at disparity 4, the lower at 9."""
+    """A textured pair: disparity 4 in the upper half, 9 in the lower."""
     random = np.random.default_rng(seed)
     left = random.integers(0, 256, (height, width + 16, channels), dtype=np.uint8)
     right = np.empty_like(left)
@@ -70,7 +70,7 @@ def by_program(left, right, *arguments, file="out.pfm"):
 
 
 def read_png(path):
-    """The samples of a PNG without a palette, of shape (height, width[, channels])."""
+    """Reads the samples of a PNG without a palette, as shape (height, width[, channels])."""
     data, at, packed = Path(path).read_bytes(), 8, b""
     while at < len(data):
         length, kind = int.from_bytes(data[at:at + 4], "big"), data[at + 4:at + 8]
@@ -109,7 +109,7 @@ def program(folder, *arguments):
 
 
 def parameters(thing):
-    """The names of the arguments; Python 3.9 finds none of a class that is not written in Python."""
+    """The argument names. Python 3.9 has no signatures of classes from extension modules."""
     if isinstance(thing, type) and sys.version_info < (3, 10):
         return []
     return list(inspect.signature(thing).parameters)
@@ -130,7 +130,7 @@ def has_device():
 
 
 def ticks_during(call):
-    """How often another thread gets to run while `call` does."""
+    """How often another thread runs during `call`."""
     ticks, done = [], threading.Event()
 
     def tick():
@@ -165,7 +165,7 @@ class Match(unittest.TestCase):
         self.assertLess(abs(np.median(matched.disparity[32:, 16:]) - 9), 0.1)
         self.assertIn("CPU", matched.ran_on)
         self.assertEqual((matched.min_disparity, matched.max_disparity, matched.tiles), (0, 15, 1))
-        # Control: another pair, and another option, give other bits.
+        # Control: another pair or another option gives other results.
         self.assertFalse(np.array_equal(matched.disparity, by_program(*pair(seed=2), "--max-disparity", "15")))
         self.assertFalse(np.array_equal(matched.disparity, by_program(left, right, "--max-disparity", "15", "--set", "fill=none")))
 
@@ -174,7 +174,7 @@ class Match(unittest.TestCase):
         self.same(left[..., 0].copy(), right[..., 0].copy())
         self.same(left.astype(np.uint16) * 16 + 3, right.astype(np.uint16) * 16 + 3)
         alone = mrfgs.match(left, right, 15, device="cpu").disparity
-        # Slices that do not lie in one piece, and alpha that says nothing.
+        # Non-contiguous slices, and an opaque alpha channel.
         wide = np.dstack([left, left])[..., :3]
         self.assertFalse(wide.flags.c_contiguous)
         self.assertTrue(np.array_equal(mrfgs.match(wide, right, 15, device="cpu").disparity, alone))
@@ -192,7 +192,7 @@ class Match(unittest.TestCase):
         expected = found(left, right)
         wide = [image.astype(np.uint16) * 13 + 3 for image in (left, right)]
         expected_of_wide = found(*wide)
-        # Control: the bits that an image has count.
+        # Control: the bit depth of an image matters.
         self.assertFalse(np.array_equal(expected_of_wide, expected))
         for dtype in (np.int16, np.int32, np.int64, np.uint32, np.uint64, ">i4"):
             for images, same in (((left, right), expected), (wide, expected_of_wide)):
@@ -201,12 +201,12 @@ class Match(unittest.TestCase):
                     self.assertTrue(np.array_equal(found(one, two), same), dtype)
         self.assertTrue(np.array_equal(found((left // 2).astype(np.int8), (right // 2).astype(np.int8)), found(left // 2, right // 2)))
         self.assertTrue(np.array_equal(found(np.asfortranarray(left.astype(int)), right.astype(int)[::-1].copy()[::-1]), expected))
-        # The views of one camera have as many bits, whatever one of them holds.
+        # Both views of a camera have the same bit depth, whatever their values.
         dark, bright = left.astype(np.uint16), right.astype(np.uint16) * 200
         for one, two in ((dark.astype(int), bright.astype(int)), (dark.astype(int), bright)):
             self.assertTrue(np.array_equal(found(one, two), found(dark, bright)))
         self.assertFalse(np.array_equal(found(left, bright), found(dark, bright)))
-        # What is masked may hold anything, and no data is told by value.
+        # Masked pixels may hold any value, and `no_data` masks a value.
         mask = np.zeros(left.shape, bool)
         mask[:, :10] = True
         masked = np.ma.masked_array(np.where(mask, -9999, left.astype(int)), mask)
@@ -224,13 +224,13 @@ class Match(unittest.TestCase):
         expected = mrfgs.match(left, right, 15, device="cpu").disparity
         with warnings.catch_warnings():
             warnings.simplefilter("error", mrfgs.MatchWarning)
-            # 8, 12 and 16 bits that show the same.
+            # The same image with 8, 12 and 16 bits.
             for one, two in ((left, right * np.uint16(16)), (left * np.uint16(16), right), (left, right * np.uint16(257)),
                              (left, right.astype(np.uint16))):
                 found = mrfgs.match(one, two, 15, device="cpu").disparity
                 self.assertLess(np.abs(found - expected)[:, 16:].mean(), 0.005)
             self.assertTrue(np.array_equal(found, expected))
-            # Controls: as words of one camera, one of them is dark.
+            # Controls: scaled as 16-bit images of one camera, one of them is dark.
             for one, two, words in ((left * np.uint16(257) - (left > 0), right.astype(np.uint16), "all one colour"),
                                     (left.astype(np.uint16), right * np.uint16(16), "far apart")):
                 with self.assertRaisesRegex(mrfgs.MatchWarning, words):
@@ -249,7 +249,7 @@ class Match(unittest.TestCase):
     def test_layouts_of_memory(self):
         left, right = pair()
         expected = mrfgs.match(left, right, 15, device="cpu").disparity
-        # Control: a layout that is taken for another makes another map.
+        # Control: misinterpreting the layout changes the map.
         scrambled = left.reshape(left.shape[1], left.shape[0], 3).transpose(1, 0, 2)
         self.assertFalse(np.array_equal(mrfgs.match(scrambled, right, 15, device="cpu").disparity, expected))
 
@@ -286,7 +286,7 @@ class Match(unittest.TestCase):
         grey = [image[..., 0] for image in (left, right)]
         expected = mrfgs.match(*(image.copy() for image in grey), 15, device="cpu").disparity
         self.assertTrue(np.array_equal(mrfgs.match(*map(np.asfortranarray, grey), 15, device="cpu").disparity, expected))
-        # The same row again and again, without a stride.
+        # The same row repeated, with stride 0.
         row = grey[0][:1].copy()
         broadcast = np.broadcast_to(row, (60, 80))
         self.assertEqual(broadcast.strides[0], 0)
@@ -309,12 +309,12 @@ class Match(unittest.TestCase):
         expected = mrfgs.match(left, right, 15, mask=mask, device="cpu").disparity
         masked = np.ma.masked_array(left, np.repeat(mask[..., None], 3, 2))
         self.assertTrue(np.array_equal(mrfgs.match(masked, right, 15, device="cpu").disparity, expected))
-        # One channel is enough, and none is nothing.
+        # A single channel is accepted, an empty one is not.
         one = np.ma.masked_array(left, np.dstack([mask, mask & False, mask & False]))
         self.assertTrue(np.array_equal(mrfgs.match(one, right, 15, device="cpu").disparity, expected))
         plain = mrfgs.match(left, right, 15, device="cpu").disparity
         self.assertTrue(np.array_equal(mrfgs.match(np.ma.masked_array(left), right, 15, device="cpu").disparity, plain))
-        # In the right view there is nothing to match then.
+        # Then nothing can be matched in the right view.
         both = mrfgs.match(left, np.ma.masked_array(right, np.repeat(mask[..., None], 3, 2)), 15, device="cpu").disparity
         self.assertFalse(np.array_equal(both, plain))
         self.assertTrue(np.isfinite(both).all())
@@ -378,7 +378,7 @@ class Match(unittest.TestCase):
     def test_options(self):
         left, right = pair()
         self.same(left, right, "--set", "fill=none", "--set", "sub-pixel=false", options={"fill": "none", "sub-pixel": False})
-        # With its group in front, and a group as a dict, in any order.
+        # Options with their group as a prefix, and groups as dicts, in any order.
         grouped = {"cost": {"outside-cost": 20, "matching": "sad"}, "refinement.fill": "row"}
         flags = [flag for change in ("matching=sad", "outside-cost=20", "fill=row") for flag in ("--set", change)]
         self.same(left, right, *flags, options=grouped)
@@ -396,7 +396,7 @@ class Match(unittest.TestCase):
         self.assertEqual((matched.right.shape, matched.right.dtype), (left.shape[:2], np.float32))
         expected = by_program(left, right, "--max-disparity", "15", "--also", "right", file="out.right.pfm")
         self.assertTrue(np.array_equal(matched.right, expected))
-        # Control: it is not the map of the left view.
+        # Control: it differs from the map of the left view.
         self.assertFalse(np.array_equal(matched.right, matched.disparity))
         self.assertTrue(np.array_equal(pickle.loads(pickle.dumps(matched)).right, matched.right))
 
@@ -408,9 +408,9 @@ class Match(unittest.TestCase):
         expected = by_program(left, right, "--max-disparity", "15", "--roi", f"{x},{y},{w},{h}")
         self.assertTrue(np.array_equal(matched.disparity, expected))
         self.assertEqual(matched.validity.shape, (h, w))
-        # Control: another part is another map.
+        # Control: another region gives another map.
         self.assertFalse(np.array_equal(mrfgs.match(left, right, 15, device="cpu", roi=(x + 1, y, w, h)).disparity, expected))
-        # Its points lie where those of the whole lie.
+        # Its points coincide with those of the full map.
         rig = mrfgs.Rig.of(100.0, 0.1, size=(width, height))
         part = rig.of_part(x, y)
         points = part.points(matched, left[y : y + h, x : x + w])
@@ -433,7 +433,7 @@ class Match(unittest.TestCase):
         self.assertEqual((window["takes"], window["source"], window["default"]), ("pixels, odd, 1 to 31", "section 3.1: 7", 7))
         self.assertIn("census", described["cost"]["matching"]["words"])
         self.assertIs(described["refinement"]["sub-pixel"]["default"], True)
-        # What a preset sets is an option as it stands.
+        # The values of a preset can be passed as options.
         left, right = pair()
         paper = {group: {key: option["paper"] for key, option in keys.items()} for group, keys in described.items()}
         self.same(left, right, "--method", "paper", options=paper)
@@ -453,11 +453,11 @@ class Match(unittest.TestCase):
             (ValueError, "1 to 4 channels", lambda: mrfgs.match(np.dstack([left, left]), right, 15)),
             (ValueError, "has pixels", lambda: mrfgs.match(left[:0], right[:0], 15)),
             (ValueError, "float", lambda: mrfgs.match(left, right.astype(np.float32), 15)),
-            (ValueError, "left: is int64 and holds -1; whole numbers are 0 to 255 or 0 to 65535: give what they mean",
+            (ValueError, "left: is int64 and contains -1; integers must be 0 to 255 or 0 to 65535: convert them",
              lambda: mrfgs.match(left.astype(np.int64) - 1 - left.min(), right, 15)),
             (ValueError, "right: is uint32 and holds 65536; whole", lambda: mrfgs.match(left, np.full((60, 80), 65536, np.uint32), 15)),
             (ValueError, "has pixels", lambda: mrfgs.match(left[:0].astype(int), right[:0].astype(int), 15)),
-            (TypeError, "left: give an array of whole numbers, float16, float32 or float64, not bool; astype", lambda: mrfgs.match(left > 9, right, 15)),
+            (TypeError, "left: give an array of integers, float16, float32 or float64, not bool; convert it with astype", lambda: mrfgs.match(left > 9, right, 15)),
             (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not 63.5", lambda: mrfgs.match(left, right, 63.5)),
             (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not NaN", lambda: mrfgs.match(left, right, np.nan)),
             (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not 10000000000", lambda: mrfgs.match(left, right, 10**10)),
@@ -485,7 +485,7 @@ class Match(unittest.TestCase):
                 call()
             self.assertIn(words, str(raised.exception))
             self.assertNotIn("\n", str(raised.exception))
-            # In the words of Python.
+            # Messages name arguments of Python, not flags.
             self.assertNotIn("--", str(raised.exception))
         with self.assertRaises(ValueError) as raised:
             mrfgs.match(left, right, -5)
@@ -500,7 +500,7 @@ class Match(unittest.TestCase):
         expected = mrfgs.match(*wide, 15, device="cpu").disparity
         for one, two in ((left, right), (left, wide[1]), (left.astype(">f2"), right), (np.ma.masked_array(left), right)):
             self.assertTrue(np.array_equal(mrfgs.match(one, two, 15, device="cpu").disparity, expected))
-        # Control: fewer bits are another image.
+        # Control: fewer bits give another image.
         self.assertFalse(np.array_equal(mrfgs.match(*(image // 32 for image in pair()), 15, device="cpu").disparity, expected))
         map_ = np.round(expected * 4).astype(np.float16) / 4
         same = map_.astype(np.float32)
@@ -510,7 +510,7 @@ class Match(unittest.TestCase):
 
     def test_arrays_of_other_libraries(self):
         class Exported:
-            """What has no other protocol than this."""
+            """An object with only this protocol."""
 
             def __init__(self, array):
                 self.array = array
@@ -539,7 +539,7 @@ class Match(unittest.TestCase):
         self.assertEqual(mrfgs.evaluate(Exported(expected), expected), mrfgs.evaluate(expected, expected))
         led = mrfgs.Steady().follow(found, Exported(left))
         self.assertTrue(np.array_equal(led.disparity, expected))
-        # What goes wrong inside of them is the cause of what is raised.
+        # Exceptions of the iterable are the cause of the one raised.
         sequence = mrfgs.Matcher(device="cpu").match_all([(left, Broken())], 15)
         for cause, call in (
             (LookupError, lambda: mrfgs.match(Broken(), right, 15)),
@@ -563,8 +563,8 @@ class Match(unittest.TestCase):
         raw, first = raw_pair(), np.moveaxis(left, -1, 0)
         path, most = TESTDATA / "mixed" / "im0.png", "1 to 1024"
         for error, words, call in (
-            # A path in the place of an array.
-            (TypeError, "left: give a numpy array, not the path of a file; mrfgs.read_image", lambda: matcher.match("left.png", right, 15)),
+            # A path instead of an array.
+            (TypeError, "left: give a numpy array, not the path of a file; read images with mrfgs.read_image", lambda: matcher.match("left.png", right, 15)),
             (TypeError, "right: give a numpy array, not the path of a file", lambda: matcher.match(left, path, 15)),
             (TypeError, "mask: give a numpy array, not the path of a file", lambda: matcher.match(left, right, 15, mask=b"mask.png")),
             (TypeError, "pair 0: left: give a numpy array, not the path", lambda: list(matcher.match_all([(str(path), right)], 15))),
@@ -572,16 +572,16 @@ class Match(unittest.TestCase):
             (TypeError, "left: give a numpy array, not the path of a file", lambda: mrfgs.Rectification.of_pair(path, path)),
             (TypeError, "disparity: give a numpy array, not the path of a file", lambda: rig.depth("d.pfm")),
             (TypeError, "sigma: give a numpy array, not the path of a file", lambda: rig.depth_sigma(found.disparity, "d.pfm")),
-            (TypeError, "truth: give a numpy array, not the path of a file; mrfgs.read_image reads an image, and mrfgs.read_disparity",
+            (TypeError, "truth: give a numpy array, not the path of a file; read images with mrfgs.read_image and maps with mrfgs.read_disparity",
              lambda: mrfgs.evaluate(found.disparity, Path("truth.pfm"))),
             (TypeError, "left: give a numpy array, not the path of a file", lambda: mrfgs.Steady().follow(found, path)),
             (TypeError, "left: give a numpy array, not the path of a file", lambda: mrfgs.Drift(by).follow(path, path, 15)),
             (TypeError, "left: give a numpy array, not the path of a file", lambda: rig.points(found, path)),
-            # Shapes of other libraries.
-            (ValueError, "left: has the shape (3, 60, 80), with the channels first: give (height, width, channels), such as "
+            # Array layouts of other libraries.
+            (ValueError, "left: has the shape (3, 60, 80), with channels first: give (height, width, channels), for example "
              "numpy.moveaxis(left, 0, -1), which has 60 rows of 80 pixels", lambda: matcher.match(first, first, 15)),
-            (ValueError, "right: has the shape (1, 60, 80), with the channels", lambda: matcher.match(left, first[:1], 15)),
-            (ValueError, "left: has the shape (3, 180, 240), with the channels", lambda: by.apply(*(np.moveaxis(r, -1, 0) for r in raw))),
+            (ValueError, "right: has the shape (1, 60, 80), with channels", lambda: matcher.match(left, first[:1], 15)),
+            (ValueError, "left: has the shape (3, 180, 240), with channels", lambda: by.apply(*(np.moveaxis(r, -1, 0) for r in raw))),
             (ValueError, "left: give an array of shape (height, width) or (height, width, channels), not (1, 60, 80, 3)",
              lambda: matcher.match(left[None], right, 15)),
             (ValueError, "disparity: give an array of shape (height, width), not (1, 60, 80); numpy.squeeze(disparity) has it",
@@ -594,16 +594,16 @@ class Match(unittest.TestCase):
             (TypeError, 'device: give "auto", "cpu", "gpu", or the index', lambda: mrfgs.Matcher(device=-1)),
             (TypeError, 'device: give "auto", "cpu", "gpu", or the index of a device or a part of its name, not 0.5', lambda: mrfgs.Matcher(device=0.5)),
             (TypeError, "not True", lambda: mrfgs.match(left, right, 15, device=True)),
-            (ValueError, f"threads: give a whole number, {most}, or None, not -1", lambda: mrfgs.Matcher(device="cpu", threads=-1)),
-            (TypeError, f"threads: give a whole number, {most}, or None, not '2'", lambda: mrfgs.match(left, right, 15, device="cpu", threads="2")),
-            (TypeError, "threads: give a whole number", lambda: mrfgs.Matcher(device="cpu", threads=1.5)),
+            (ValueError, f"threads: give an integer from {most}, or None, not -1", lambda: mrfgs.Matcher(device="cpu", threads=-1)),
+            (TypeError, f"threads: give an integer from {most}, or None, not '2'", lambda: mrfgs.match(left, right, 15, device="cpu", threads="2")),
+            (TypeError, "threads: give an integer", lambda: mrfgs.Matcher(device="cpu", threads=1.5)),
             (ValueError, f"threads: {2**63 - 1} threads cannot be had; give {most}", lambda: mrfgs.Matcher(device="cpu", threads=10**30)),
-            (TypeError, "options: the keys are names of options, which mrfgs.options() describes, such as \"fill\", not 3",
+            (TypeError, "options: keys must be names of options, such as \"fill\" (see mrfgs.options()), not 3",
              lambda: matcher.match(left, right, 15, options={3: 4})),
-            (TypeError, 'options["cost"]: the keys are names of options', lambda: matcher.match(left, right, 15, options={"cost": {None: 4}})),
+            (TypeError, 'options["cost"]: keys must be names of options', lambda: matcher.match(left, right, 15, options={"cost": {None: 4}})),
             (TypeError, 'options: give a dict, such as {"fill": "none"}, not str', lambda: matcher.match(left, right, 15, options="fill=none")),
             (TypeError, "options: give a dict", lambda: matcher.match_all([], 15, options=[7])),
-            (ValueError, "method: there is no preset 'best', and no such file; give one of ", lambda: matcher.match(left, right, 15, method="best")),
+            (ValueError, "method: 'best' is neither a preset nor a file; give one of ", lambda: matcher.match(left, right, 15, method="best")),
             (TypeError, "method: give the name of a preset, or the path of a TOML file", lambda: matcher.match_all([], 15, method=7)),
             (FileNotFoundError, "none.toml: there is no such file", lambda: matcher.match(left, right, 15, method="none.toml")),
             (ValueError, "memory: give a whole number of MiB, GiB or TiB, from 1MiB to 16TiB, like 2GiB", lambda: matcher.match(left, right, 15, memory="2GB")),
@@ -615,7 +615,7 @@ class Match(unittest.TestCase):
                 self.assertIs(type(raised.exception), error, raised.exception)
                 self.assertIn(words, str(raised.exception))
                 self.assertNotIn("\n", str(raised.exception))
-        # What makes sense.
+        # Valid values.
         for threads in (np.int64(1), 2):
             self.assertTrue(np.array_equal(mrfgs.match(left, right, 15, device="cpu", threads=threads).disparity, found.disparity))
         if has_device():
@@ -651,14 +651,14 @@ class Match(unittest.TestCase):
             (folder / "image.pfm").write_bytes(b"Pf\n2 1\n-1\n" + np.array([1.5, np.nan], "<f4").tobytes())
             found = mrfgs.read_image(str(folder / "image.pfm"))
             self.assertEqual((found.dtype, found.shape, found[0, 0]), (np.float32, (1, 2), 1.5))
-            # RGB, and alpha that says where there is nothing.
+            # RGB, and alpha that masks pixels.
             views = [mrfgs.read_image(TESTDATA / "mixed" / f"im{i}.png") for i in (0, 1)]
             for i, view in enumerate(views):
                 self.assertTrue(np.array_equal(view, read_png(TESTDATA / "mixed" / f"im{i}.png")))
             program(folder, "match", TESTDATA / "mixed" / "im0.png", TESTDATA / "mixed" / "im1.png", "d.pfm", "--max-disparity", 47,
                     "--device", "cpu", "--quiet")
             self.assertTrue(np.array_equal(mrfgs.match(*views, max_disparity=47, device="cpu").disparity, read_pfm(folder / "d.pfm")))
-            # Stored turned, with a value for no data: both are tags of TIFF.
+            # With an orientation and a no-data value, which are tags of TIFF.
             pixels = np.arange(6, dtype=np.uint8).reshape(2, 3)
             tags = [(256, 3, 1, 3), (257, 3, 1, 2), (258, 3, 1, 8), (259, 3, 1, 1), (262, 3, 1, 1), (273, 4, 1, 8), (274, 3, 1, 6),
                     (277, 3, 1, 1), (278, 3, 1, 2), (279, 4, 1, 6), (42113, 2, 2, int.from_bytes(b"4\0", "little"))]
@@ -696,7 +696,7 @@ class Match(unittest.TestCase):
 
 
 class CtrlC(unittest.TestCase):
-    """The first call in a program opens the device, compiles its shaders, and sees whether it is right."""
+    """The first call in a program opens the device, compiles its shaders and checks it."""
 
     CODE = """
 import signal, sys, time
@@ -751,7 +751,7 @@ class Folder(unittest.TestCase):
         self.assertIs(type(raised.exception), error)
         said = str(raised.exception)
         self.assertIn(words, said)
-        # One line, in the words of Python.
+        # A single line that names arguments of Python.
         self.assertNotIn("\n", said)
         self.assertNotIn("--", said)
 
@@ -772,18 +772,18 @@ class RectificationByMatches(Folder):
             self.assertTrue(np.array_equal(np.where(view.mask, 0, view.data), np.where(view.mask, 0, expected)))
             for axis, found in zip("xy", by.maps()[i]):
                 self.assertTrue(np.array_equal(found, read_pfm(self.folder / f"out/map{i}{axis}.pfm")))
-        # A copy is made of the same matches.
+        # A copy is rebuilt from the same matches.
         again = pickle.loads(pickle.dumps(by))
         self.assertTrue(np.array_equal(again.maps()[1][1], by.maps()[1][1]))
         self.assertEqual(again.trust, by.trust)
         trust = by.trust
         self.assertEqual(list(trust), ["matches", "agreeing", "median", "percentile95", "coverage", "off_one_plane"])
         self.assertTrue(30 <= trust["agreeing"] <= trust["matches"] and 0 < trust["median"] < trust["percentile95"] < 1.5)
-        # There is no scale.
+        # The scale is unknown.
         for use in (lambda: by.rig, by.calib_txt, by.cameras_yml):
             with self.assertRaisesRegex(ValueError, "no scale"):
                 use()
-        # Control: by a calibration there is one, and other views.
+        # Control: with a calibration there is a scale, and the views differ.
         known = mrfgs.Rectification(CAMERAS)
         self.assertIsNone(known.trust)
         self.assertFalse(np.array_equal(known.maps()[0][0], by.maps()[0][0]))
@@ -805,7 +805,7 @@ class RectificationByMatches(Folder):
 
 class Rectification(Folder):
     def same(self, left, right, calibration, files, *arguments, **keywords):
-        """That the program gives the same for the files LEFT RIGHT."""
+        """The output of the program for the files LEFT RIGHT."""
         if (self.folder / "out").exists():
             (self.folder / "out").rename(tempfile.mkdtemp(dir=self.folder) + "/out")
         program(self.folder, "rectify", *files, "out", "--calib", *arguments, "--maps", "--quiet")
@@ -845,15 +845,15 @@ class Rectification(Folder):
             self.assertTrue(np.array_equal(rotation.ravel(), np.array(data.split(","), float)))
         for alpha in (0, 0.5, 1):
             other, other_views = self.same(left, right, str(CAMERAS), files, CAMERAS, "--alpha", alpha, alpha=alpha)
-            # Control: another choice makes other views.
+            # Control: another option gives other views.
             self.assertFalse(np.array_equal(other_views[0].data, views[0].data))
         self.assertTrue(views[0].mask.mean() < other_views[0].mask.mean())
         self.assertNotEqual(mrfgs.Rectification(CAMERAS, zero_disparity=False).rig.doffs, 0)
         self.assertEqual(by.rig.doffs, 0)
-        # The same again: it is found once.
+        # Repeating it uses the cached maps.
         again = by.apply(left, right)
         self.assertTrue(all(np.array_equal(a.data, b.data) and np.array_equal(a.mask, b.mask) for a, b in zip(views, again)))
-        # Control: the views are not exchanged.
+        # Control: the views are not swapped.
         swapped = by.apply(right, left)
         self.assertFalse(np.array_equal(swapped[0].data, views[0].data))
 
@@ -867,13 +867,13 @@ class Rectification(Folder):
             write_ppm(files[0], left)
             write_ppm(files[1], right)
             if left.dtype == np.uint16 and (left % 257 == 0).all():
-                # Words that hold 8 bits stay words here, and are bytes in the program's files.
+                # 16-bit images with 8-bit values remain 16-bit here, but are bytes in the program's files.
                 by = mrfgs.Rectification(CAMERAS)
                 views, bytes_ = by.apply(left, right), by.apply(*grey)
                 self.assertTrue(np.array_equal(views[0].data, bytes_[0].data.astype(np.uint16) * 257))
             else:
                 by, views = self.same(left, right, CAMERAS, files, CAMERAS)
-            # What is matched is what the program matches of its files.
+            # Matching the views gives the map of the program for its files.
             found = mrfgs.match(*views, 31, device="cpu", warn=False).disparity
             program(self.folder, "match", *files, "d.pfm", "--rectify", "--calib", CAMERAS, "--max-disparity", 31, "--device", "cpu", "--quiet")
             if left.dtype == np.uint8 or (left % 257 == 0).all():
@@ -883,7 +883,7 @@ class Rectification(Folder):
                 self.assertTrue(np.array_equal(found, read_pfm(self.folder / "d.pfm")))
         by = mrfgs.Rectification(CAMERAS)
         expected = by.apply(*colour)
-        # Alpha is a mask, and one kind of image may meet another.
+        # Alpha acts as a mask, and the views may have different formats.
         opaque = [np.dstack([image, np.full(image.shape[:2], 9, np.uint8)]) for image in colour]
         found = by.apply(*opaque)
         self.assertEqual(found[0].shape, expected[0].shape)
@@ -940,7 +940,7 @@ class Rectification(Folder):
         sigma = rig.depth_sigma(found.disparity, found.sigma)
         self.assertTrue(np.array_equal(sigma, read_pfm(self.folder / "d.depth-sigma.pfm")))
         self.assertTrue(np.array_equal(rig.depth_sigma(found.disparity, 2 * found.sigma), 2 * sigma))
-        self.refused(ValueError, "sigma: is 240 x 179, and disparity 240 x 180", lambda: rig.depth_sigma(found.disparity, found.sigma[1:]))
+        self.refused(ValueError, "sigma: is 240 x 179, but disparity is 240 x 180", lambda: rig.depth_sigma(found.disparity, found.sigma[1:]))
         near = np.isfinite(depth) & (depth < 65)
         self.assertLessEqual(np.abs(millimetres[near] - depth[near] * 1000).max(), 0.51)
         self.assertTrue((millimetres[~np.isfinite(depth)] == 0).all() and np.isinf(depth).any())
@@ -952,7 +952,7 @@ class Rectification(Folder):
             self.assertEqual((self.folder / f"python.{name}").read_bytes(), (self.folder / f"d.points.{name}").read_bytes())
         self.assertEqual((rig.unit, rig.size), ("m", (240, 180)))
         self.assertAlmostEqual(rig.baseline, 0.16361, 5)
-        # Control: of another map, other depths and points.
+        # Control: another map gives other depths and points.
         other = mrfgs.match(*views, 12, device="cpu", warn=False)
         self.assertFalse(np.array_equal(rig.depth(other.disparity), depth))
         rig.points(other, views[0]).save(self.folder / "python.ply")
@@ -976,22 +976,22 @@ class Rectification(Folder):
             self.assertTrue(np.array_equal(found, expected), name)
         millimetres = rectification.rig.registered_millimetres(disparity, camera)
         self.assertTrue(np.array_equal(millimetres, read_png(self.folder / "d.depth-registered-mm.png")))
-        # A part of the map shows the same there, but where a surface is cut.
+        # A region of the map gives the same depths, except where a surface is cut.
         part = rectification.rig.of_part(40, 30).registered(disparity[30:, 40:], camera)
         both = np.isfinite(part) & np.isfinite(expected)
         self.assertGreater((part[both] == expected[both]).mean(), 0.98)
         self.assertGreater(both.sum(), 0.6 * np.isfinite(expected).sum())
-        # Control: without the rotation of the rectification, the camera stands elsewhere.
+        # Control: without the rotation of the rectification, the pose of the camera is wrong.
         (self.folder / "rectified.yml").write_text(rectification.cameras_yml())
         rectified = mrfgs.Rig(self.folder / "rectified.yml")
         self.assertFalse(np.array_equal(rectified.registered(disparity, camera), expected))
         self.refused(FileNotFoundError, "none.yml: there is no such file", lambda: mrfgs.ThirdCamera("none.yml"))
         self.refused(TypeError, "camera: give a ThirdCamera, or the path of its file", lambda: rectified.registered(disparity, 7))
         self.refused(ValueError, "the text: ", lambda: mrfgs.ThirdCamera.of_text("K: [1, 2]"))
-        self.refused(ValueError, "ThirdCamera.of_text takes", lambda: mrfgs.ThirdCamera(third.read_text()))
+        self.refused(ValueError, "ThirdCamera.of_text", lambda: mrfgs.ThirdCamera(third.read_text()))
         self.refused(ValueError, "disparity: is 240 x 179", lambda: rectified.registered(disparity[1:], camera))
         unknown = mrfgs.Rig.of(260, 0.1, size=(240, 180))
-        self.refused(ValueError, "does not say the unit", lambda: unknown.registered_millimetres(disparity, camera))
+        self.refused(ValueError, "lacks the unit", lambda: unknown.registered_millimetres(disparity, camera))
 
     def test_forms_of_calibrations(self):
         text = CAMERAS.read_text()
@@ -1027,7 +1027,7 @@ class Rectification(Folder):
             self.assertTrue(np.array_equal(found, expected), form)
             calibration = form if isinstance(form, mrfgs.Calibration) else mrfgs.Calibration(*files)
             self.assertEqual((calibration.unit, calibration.size, calibration.max_disparity), ("m", (240, 180), None))
-        # Control: a lens that bends otherwise.
+        # Control: a lens with another distortion.
         other = mrfgs.Calibration.of_texts(text.replace("-0.16,", "-0.15,"))
         self.assertFalse(np.array_equal(mrfgs.Rectification(other).maps(), expected))
         camera = ("image_width: 240\nimage_height: 180\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [200, 0, 120, 0, 200, 90, 0, 0, 1]\n"
@@ -1045,7 +1045,7 @@ class Rectification(Folder):
     def test_one_camera_above_the_other(self):
         text = CAMERAS.read_text()
         head, pose = text.split("R: ")
-        # Down by a baseline, without rotation.
+        # Shifted down by a baseline, without rotation.
         below = head + ("R: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 1, 0, 0, 0, 1, 0, 0, 0, 1 ]\n"
                         "T: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [ 0.0, -0.2, 0.0 ]\n")
         path = self.write("below.yml", below)
@@ -1069,7 +1069,7 @@ class Rectification(Folder):
         made = [mrfgs.Calibration(path), mrfgs.Calibration(path, unit="cm"), mrfgs.Calibration(*two),
                 mrfgs.Calibration.of_texts(CAMERAS.read_text()), mrfgs.Calibration(TESTDATA / "mixed" / "calib.txt")]
         pickled = [pickle.dumps(calibration) for calibration in made]
-        # The files may be gone, and other ones in their place.
+        # The files may have been deleted or replaced.
         path.unlink()
         two[0].write_text(two[1].read_text())
         for calibration, bytes_ in zip(made, pickled):
@@ -1104,7 +1104,7 @@ class Rectification(Folder):
                     self.assertTrue(np.array_equal(other.rig.depth(disparity), by.rig.depth(disparity)))
                 for one, same in zip(other.apply(*raw), views):
                     self.assertTrue(np.array_equal(one.data, same.data) and np.array_equal(one.mask, same.mask))
-            # Control: they are not all the same.
+            # Control: they are not all equal.
             seen.append((by.rig.unit, by.maps()[0][0].tobytes(), by.rig.doffs))
         self.assertEqual(len(set(seen)), 5)
         ours = mrfgs.Rectification(path).rig
@@ -1118,7 +1118,7 @@ class Rectification(Folder):
                 self.assertTrue(np.array_equal(other.cameras, rig.cameras))
                 map_ = disparity if rig.size in (None, (240, 180)) else np.full(rig.size[::-1], 9.5)
                 self.assertTrue(np.array_equal(other.depth(map_), rig.depth(map_)))
-        self.refused(ValueError, f"{path} is of images of 240 x 180", lambda: pickle.loads(pickle.dumps(ours)).depth(disparity[1:]))
+        self.refused(ValueError, f"{path} is for images of 240 x 180", lambda: pickle.loads(pickle.dumps(ours)).depth(disparity[1:]))
 
     def test_workers_take_them(self):
         with multiprocessing.get_context("spawn").Pool(1) as pool:
@@ -1132,7 +1132,7 @@ class Rectification(Folder):
         metres = mrfgs.Rectification(CAMERAS).rig
         self.assertEqual(unknown.unit, "unknown")
         self.assertTrue(np.array_equal(unknown.depth(disparity), metres.depth(disparity)))
-        self.refused(ValueError, "does not say the unit of the baseline; give it by Calibration(..., unit=", lambda: unknown.millimetres(disparity))
+        self.refused(ValueError, "lacks the unit of the baseline; use Calibration(..., unit=", lambda: unknown.millimetres(disparity))
         for unit, factor in (("m", 1), ("cm", 0.01), ("mm", 0.001)):
             rig = mrfgs.Rectification(mrfgs.Calibration.of_texts(text, unit=unit)).rig
             self.assertEqual(rig.unit, unit)
@@ -1154,7 +1154,7 @@ class Rectification(Folder):
         ):
             with self.assertWarnsRegex(mrfgs.MatchWarning, words):
                 call()
-        # A part is what the caller says, and a copy knows it.
+        # The caller chooses the region, and a copy keeps it.
         with warnings.catch_warnings():
             warnings.simplefilter("error", mrfgs.MatchWarning)
             part = of_texts(text, crop=(0, 20, 240, 140))
@@ -1191,23 +1191,23 @@ class Rectification(Folder):
             (ValueError, "size: the text does not say the size of the images; give (width, height)", lambda: mrfgs.Rectification(sizeless)),
             (ValueError, "size: give (width, height), both above 0", lambda: mrfgs.Rectification(sizeless, (0, 180))),
             (ValueError, "size: give (width, height), both above 0", lambda: mrfgs.Rectification(sizeless, (-240, 180))),
-            (TypeError, "size: give (width, height), two whole numbers", lambda: mrfgs.Rectification(sizeless, left.shape)),
-            (TypeError, "size: give (width, height), two whole numbers", lambda: mrfgs.Rectification(sizeless, 240)),
-            (TypeError, "size: give (width, height), two whole numbers", lambda: mrfgs.Rectification(sizeless, (240.5, 180))),
+            (TypeError, "size: give (width, height), two integers", lambda: mrfgs.Rectification(sizeless, left.shape)),
+            (TypeError, "size: give (width, height), two integers", lambda: mrfgs.Rectification(sizeless, 240)),
+            (TypeError, "size: give (width, height), two integers", lambda: mrfgs.Rectification(sizeless, (240.5, 180))),
             (ValueError, "alpha: give a number from 0 to 1, not 1.5", lambda: mrfgs.Rectification(CAMERAS, alpha=1.5)),
             (ValueError, "alpha", lambda: mrfgs.Rectification(CAMERAS, alpha=float("nan"))),
             (ValueError, "240 x 180 and these are 239 x 180", lambda: by.apply(left[:, 1:], right[:, 1:])),
             (ValueError, "240 x 180 and these are 239 x 180", lambda: by.apply(left, right[:, 1:])),
-            (TypeError, "left: give an array of whole numbers", lambda: by.apply(left > 9, right)),
+            (TypeError, "left: give an array of integers", lambda: by.apply(left > 9, right)),
             (TypeError, "right", lambda: by.apply(left, "right.png")),
             (ValueError, "mask", lambda: by.apply(left, right, mask=np.zeros((3, 3), bool))),
-            (ValueError, "cameras.yml: is of images that are not rectified; take the rig of a Rectification", lambda: mrfgs.Rig(CAMERAS)),
+            (ValueError, "cameras.yml: describes images that are not rectified; use Rectification(...).rig", lambda: mrfgs.Rig(CAMERAS)),
             (ValueError, "the text: the calibration does not say cam0 and doffs and baseline", lambda: mrfgs.Rig(of_texts("ndisp=64\n"))),
             (ValueError, "baseline=0 is not above 0", lambda: mrfgs.Rig(of_texts("cam0=[9 0 2; 0 9 2; 0 0 1]\ndoffs=0\nbaseline=0\n"))),
         ):
             with self.subTest(words):
                 self.refused(error, words, call)
-        # Maps of a size that no machine holds.
+        # Maps too large for any machine.
         flat = of_texts("cam0=[1e9 0 1e8; 0 1e9 1e8; 0 0 1]\ndoffs=0\nbaseline=20\n")
         self.refused(MemoryError, "of memory are needed", mrfgs.Rectification(flat, (1 << 28, 1 << 28)).maps)
 
@@ -1229,7 +1229,7 @@ class Depth(Folder):
         points.save(str(self.folder / "python.ply"))
         expected = (self.folder / "d.points.ply").read_bytes()
         self.assertEqual((self.folder / "python.ply").read_bytes(), expected)
-        # The arrays are what the file holds.
+        # The arrays equal the contents of the file.
         dtype = [("position", "<f4", 3), ("colour", "u1", 3), ("quality", "<f4")]
         cloud = np.frombuffer(expected.split(b"end_header\n", 1)[1], dtype)
         self.assertTrue(np.array_equal(points.positions, cloud["position"]))
@@ -1238,7 +1238,7 @@ class Depth(Folder):
         self.assertEqual((points.positions.dtype, points.colours.dtype, points.confidence.dtype), (np.float32, np.uint8, np.uint8))
         self.assertEqual(len(points), (found.validity == 0).sum())
         self.assertIn(str(len(points)), repr(points))
-        # By the definition: Z = baseline f / d, at trusted pixels, row by row.
+        # By definition: Z = baseline f / d at reliable pixels, row by row.
         y, x = np.nonzero(found.validity == 0)
         (f, _, cx), (_, _, cy) = rig.cameras[0][:2]
         z = rig.baseline * f / (found.disparity[y, x] + rig.doffs)
@@ -1247,7 +1247,7 @@ class Depth(Folder):
         for other in (pickle.loads(pickle.dumps(points)), copy.deepcopy(points)):
             self.assertTrue(np.array_equal(other.positions, points.positions))
             self.assertEqual(other.unit, rig.unit)
-        # A part of a cloud is a cloud.
+        # A subset of a cloud is a cloud.
         near = points.positions[:, 2] < np.median(points.positions[:, 2])
         part = mrfgs.Points(points.positions[near].astype(np.float64), points.colours[near], points.confidence[near])
         part.save(self.folder / "part.ply")
@@ -1296,7 +1296,7 @@ class Depth(Folder):
         self.assertTrue(np.array_equal(other.depth(found.disparity), mrfgs.Rig.of(700, 120, size=(80, 60)).depth(found.disparity)))
         self.assertFalse(np.array_equal(other.points(found, left).positions, rig.points(found, left).positions))
         self.assertFalse(np.array_equal(mrfgs.Rig.of(701, 120, size=(80, 60)).depth(found.disparity), rig.depth(found.disparity)))
-        self.refused(ValueError, "Rig.of: does not say the unit of the baseline", lambda: other.millimetres(found.disparity))
+        self.refused(ValueError, "Rig.of: lacks the unit of the baseline", lambda: other.millimetres(found.disparity))
 
     def test_where_there_is_no_depth(self):
         rig = mrfgs.Rig(mrfgs.Calibration.of_texts("cam0=[100 0 2; 0 100 2; 0 0 1]\ndoffs=5\nbaseline=20\n"))
@@ -1325,13 +1325,13 @@ class Depth(Folder):
         self.assertEqual(len(rig.points(changed, left)), 0)
         for error, words, call in (
             (TypeError, "disparity: give an array, such as Matched.disparity", lambda: rig.depth(found)),
-            (TypeError, "divide whole numbers by their scale", lambda: rig.depth(np.zeros((3, 3), np.int16))),
+            (TypeError, "divide integers by their scale", lambda: rig.depth(np.zeros((3, 3), np.int16))),
             (TypeError, "disparity", lambda: rig.depth("d.pfm")),
             (ValueError, "disparity: give an array of shape (height, width)", lambda: rig.depth(np.zeros(3))),
             (ValueError, "disparity: is 80 x 60, and the text is of images of 81 x 60", lambda: sized.depth(found.disparity)),
             (ValueError, "matched: is 80 x 60", lambda: sized.points(found, left)),
             (ValueError, "left: is 79 x 60 and the maps are 80 x 60", lambda: rig.points(found, left[:, 1:])),
-            (TypeError, "left: give an array of whole numbers", lambda: rig.points(found, left > 9)),
+            (TypeError, "left: give an array of integers", lambda: rig.points(found, left > 9)),
             (ValueError, "positions: give an array of shape (N, 3)", lambda: mrfgs.Points(positions[:, :2], colours, confidence)),
             (TypeError, "colours: give an array of shape (N, 3), uint8", lambda: mrfgs.Points(positions, colours / 255, confidence)),
             (ValueError, "unit: give mm, cm, m or unknown", lambda: mrfgs.Points(positions, colours, confidence, "feet")),
@@ -1340,9 +1340,9 @@ class Depth(Folder):
             (OSError, "python.laz", lambda: mrfgs.Points(positions + np.inf, colours, confidence).save(self.folder / "python.laz")),
             (ValueError, "focal: give a number above 0, not -7", lambda: mrfgs.Rig.of(-7, 0.1, size=(8, 6))),
             (ValueError, "baseline: give a number above 0, not inf", lambda: mrfgs.Rig.of(7, np.inf, size=(8, 6))),
-            (ValueError, "size: give (width, height) of the images, whose centre", lambda: mrfgs.Rig.of(7, 0.1)),
+            (ValueError, "size: give (width, height) of the images, to use their centre", lambda: mrfgs.Rig.of(7, 0.1)),
             (ValueError, "size: give (width, height), both above 0", lambda: mrfgs.Rig.of(7, 0.1, size=(0, 6))),
-            (ValueError, "principal_point and doffs: give numbers, not NaN", lambda: mrfgs.Rig.of(7, 0.1, principal_point=(1, np.nan))),
+            (ValueError, "principal_point and doffs: give finite numbers, not NaN", lambda: mrfgs.Rig.of(7, 0.1, principal_point=(1, np.nan))),
             (ValueError, "unit: give mm, cm, m or unknown, not \"feet\"", lambda: mrfgs.Rig.of(7, 0.1, size=(8, 6), unit="feet")),
             (ValueError, "disparity: is 80 x 60, and Rig.of is of images of 8 x 6", lambda: mrfgs.Rig.of(7, 0.1, size=(8, 6)).depth(found.disparity)),
             (OSError, "there is no folder", lambda: points.save(self.folder / "nowhere" / "python.ply")),
@@ -1377,7 +1377,7 @@ class Evaluation(Folder):
         self.assertEqual(list(found["all"]), list(expected["with.json"]["all"]))
         self.assertEqual(mrfgs.evaluate(map_, truth), expected["without.json"])
         self.assertIsNone(expected["without.json"]["nonocc"])
-        # Files, with whatever scale their header has.
+        # Files, with any scale factor in their header.
         expected_truth = np.where(np.isfinite(truth), truth, np.inf)
         bytes_ = (self.folder / "truth.pfm").read_bytes()
         for scale in (b"-1", b"-0.003922", b"-256.0"):
@@ -1399,12 +1399,12 @@ class Evaluation(Folder):
         for threshold in (0.5, 1.0, 2.0, 4.0):
             self.assertAlmostEqual(everything[f"bad{threshold}"], 100 * (~valid | (error > threshold)).mean(), 9)
         self.assertEqual(found["nonocc"]["pixels"], (known & (mask == 255)).sum())
-        # The same in other kinds of arrays.
+        # The same with other kinds of arrays.
         for other in (mrfgs.evaluate(np.asfortranarray(map_), truth[::-1].copy()[::-1], mask == 255),
                       mrfgs.evaluate(map_.astype(">f8"), truth.astype(np.float64), np.asfortranarray(mask)),
                       mrfgs.evaluate(np.ma.masked_invalid(map_), np.ma.masked_array(np.where(known, truth, 7), ~known), mask)):
             self.assertEqual(other, found)
-        # Controls: another map, another truth, another mask.
+        # Controls: another map, another ground truth, another mask.
         self.assertNotEqual(mrfgs.evaluate(map_[::-1], truth, mask), found)
         self.assertNotEqual(mrfgs.evaluate(map_, np.ma.masked_array(np.where(known, truth, 7)), mask), found)
         self.assertNotEqual(mrfgs.evaluate(map_, truth, mask != 255), found)
@@ -1448,7 +1448,7 @@ class Sequences(Folder):
     def test_a_sequence_is_its_pairs_in_order(self):
         pairs = [pair(seed=seed) for seed in (1, 2, 3, 4, 1)] + [pair(50, 90, seed=6)]
         expected = [self.matcher.match(*images, 15).disparity for images in pairs]
-        # Control: confusing two of them would be found.
+        # Control: swapping two of them would be detected.
         self.assertFalse(np.array_equal(expected[0], expected[1]))
         for given in (pairs, iter(pairs), [list(images) for images in pairs], [np.stack(images) for images in pairs], zip(*zip(*pairs))):
             found = list(self.matcher.match_all(given, 15))
@@ -1457,7 +1457,7 @@ class Sequences(Folder):
                 self.assertIsInstance(one, mrfgs.Matched)
                 self.assertTrue(np.array_equal(one.disparity, other))
         self.assertEqual(list(self.matcher.match_all([], 15)), [])
-        # The arguments of `match`, and the range of each pair by itself.
+        # The arguments of `match`, and a separate range for each pair.
         found = list(self.matcher.match_all(pairs, 15, min_disparity=-2, method="fast", options={"fill": "none"}, no_data=7))
         for one, images in zip(found, pairs):
             self.assertTrue(np.array_equal(one.disparity, self.matcher.match(
@@ -1485,7 +1485,7 @@ class Sequences(Folder):
         results = self.matcher.match_all(endless(), 15)
         self.assertEqual(taken, [])
         for i, _ in enumerate(itertools.islice(results, 6)):
-            # The result i, and no more than two ahead.
+            # Result i, with at most two pairs read ahead.
             self.assertEqual(len(taken), i + 3)
         results.close()
         self.assertEqual(len(taken), 8)
@@ -1509,14 +1509,14 @@ class Sequences(Folder):
             self.assertTrue(np.array_equal(led.disparity, expected[step]), step)
             for name in ("raw", "confidence", "sigma", "validity"):
                 self.assertIs(getattr(led, name), getattr(found, name))
-            # Control: only the first frame has no past.
+            # Control: only the first frame has no history.
             self.assertEqual(np.array_equal(led.disparity, found.disparity), step == 0, step)
-        self.refused(ValueError, "left: is 120 x 89 and the maps are 120 x 90", lambda: steady.follow(alone[0], left[1:]))
+        self.refused(ValueError, "left: is 120 x 89 but the maps are 120 x 90", lambda: steady.follow(alone[0], left[1:]))
         self.refused(TypeError, "Matched", lambda: steady.follow(alone[0].disparity, left))
 
     def test_a_rig_that_has_turned_is_corrected_as_the_program_does(self):
         left, right = (read_png(TESTDATA / "slanted" / name) for name in ("im0.png", "im1.png"))
-        # By how much the right camera looks up and clockwise, in radians; points turn the other way.
+        # Pitch and roll of the right camera in radians; points turn the opposite way.
         x, z = np.radians([0.4, -0.5])
         up = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
         before = up @ np.array([[np.cos(z), -np.sin(z), 0], [np.sin(z), np.cos(z), 0], [0, 0, 1]])
@@ -1548,7 +1548,7 @@ class Sequences(Folder):
             maps.append(self.matcher.match(*views, 31, warn=False).disparity)
             self.assertTrue(np.array_equal(maps[-1], expected[step]), step)
             by = drift.correct() or by
-        # Control: it was corrected, and the first frame was not.
+        # Control: later frames were corrected, the first one was not.
         self.assertFalse(np.array_equal(maps[0], maps[-1]))
         turn = drift.turn
         self.assertEqual(sorted(turn), ["counts", "degrees", "errors", "matches", "rows"])
@@ -1556,7 +1556,7 @@ class Sequences(Folder):
         self.assertTrue(np.allclose(turn["degrees"], turned, atol=1e-3), (turn, turned))
         self.assertTrue(np.allclose(np.array(turn["degrees"])[[0, 2]], [0.4, -0.5], atol=0.05))
         self.assertTrue(max(turn["errors"]) < 0.1)
-        # What is corrected is a rectification like others; and of a rig that turns once more.
+        # The result is an ordinary rectification, also if the rig turns again.
         again = mrfgs.Drift(by)
         again.follow(*calibrated.apply(left, right), 31)
         twice = again.correct()
@@ -1610,11 +1610,11 @@ class Sequences(Folder):
                 found.append(one)
         self.assertEqual((len(found), str(raised.exception)), (2, "the camera is gone"))
         self.assertEqual(list(results), [])
-        # The matcher is free again.
+        # The matcher is available again.
         self.matcher.match(*pair(), 15)
         left, right = pair()
         for error, words, bad in (
-            (TypeError, "pair 1: left: give an array of whole numbers", (left > 9, right)),
+            (TypeError, "pair 1: left: give an array of integers", (left > 9, right)),
             (ValueError, "pair 1: the left image is 80 x 60 and the right one is 79 x 60", (left, right[:, 1:])),
             (TypeError, "pair 1: give two arrays, left and right", left),
             (TypeError, "pair 1: give two arrays, left and right", None),
@@ -1629,10 +1629,10 @@ class Sequences(Folder):
 
             self.refused(error, words, go)
             self.assertEqual(len(found), 1)
-        # What the match itself refuses.
+        # Errors of the match itself.
         self.refused(ValueError, "pair 0: the views have too few matches", lambda: list(self.matcher.match_all([(left * 0, right * 0)])))
         self.refused(ValueError, "pair 0: memory: 1 MiB", lambda: list(self.matcher.match_all([(left, right)], 15, options={"memory": 1})))
-        # Before any pair is taken.
+        # Errors before any pair is read.
         taken = iter([(left, right)])
         for error, words, call in (
             (ValueError, "no preset", lambda: self.matcher.match_all(taken, 15, method="best")),
@@ -1661,13 +1661,13 @@ class Sequences(Folder):
             finally:
                 closed.append(True)
 
-        # Before its first pair it has nothing to give back.
+        # Before the first pair there is nothing to release.
         results = self.matcher.match_all(pairs(), 63, warn=False)
         results.close()
         self.assertEqual(list(results), [])
         results = self.matcher.match_all(pairs(), 63, warn=False)
         next(results)
-        # Until it ends, it has the matcher.
+        # The iterator holds the matcher until it ends.
         self.refused(RuntimeError, "in the middle of match_all", lambda: self.matcher.match(*pair(), 15))
         self.refused(RuntimeError, "in the middle of match_all", lambda: next(self.matcher.match_all([pair()], 15)))
         self.assertEqual(closed, [])
@@ -1680,7 +1680,7 @@ class Sequences(Folder):
         with contextlib.closing(self.matcher.match_all(pairs(), 15, warn=False)) as results:
             next(results)
         self.matcher.match(*pair(), 15)
-        # A loop that is left lets go of it.
+        # Leaving the loop releases the matcher.
         for found in self.matcher.match_all(pairs(), 15, warn=False):
             break
         self.matcher.match(*pair(), 15)
@@ -1697,8 +1697,8 @@ class Sequences(Folder):
         said = []
         results = self.matcher.match_all(pairs(), 15)
         self.assertEqual(len(list(results)), 2)
-        self.assertIn("in use already", said[0])
-        # Another thread may ask for the next one.
+        self.assertIn("already in use", said[0])
+        # Another thread may request the next result.
         results, found = self.matcher.match_all([pair(seed=1), pair(seed=2)], 15), []
         for _ in range(2):
             thread = threading.Thread(target=lambda: found.append(next(results)))
@@ -1726,7 +1726,7 @@ class Sequences(Folder):
 
     @unittest.skipIf(sys.platform == "win32", "no signals there")
     def test_ctrl_c_ends_a_sequence(self):
-        # Who starts the tests in the background may have told them to ignore Ctrl-C.
+        # Tests that run in the background may ignore Ctrl-C.
         code = ("import itertools, signal, numpy as np, mrfgs\n"
                 "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
                 "a = np.random.default_rng(1).integers(0, 256, (1500, 1500), dtype=np.uint8)\n"
@@ -1752,7 +1752,7 @@ class Sequences(Folder):
 
 
 def digest(*things):
-    """A number for all bits of arrays and texts."""
+    """A checksum of all arrays and texts."""
     found = 0
     for thing in things:
         bytes_ = np.ascontiguousarray(np.ma.filled(thing, 0)).tobytes() if isinstance(thing, np.ndarray) else str(thing).encode()
@@ -1761,7 +1761,7 @@ def digest(*things):
 
 
 def everything(matcher=None):
-    """What all that computes has given, as a number."""
+    """A checksum of the results of all functions."""
     matcher = matcher or mrfgs.Matcher(device="cpu")
     views, raw = pair(200, 300), raw_pair()
     found = matcher.match(*views)
@@ -1780,12 +1780,12 @@ def matched_by_a_worker(seed):
     return digest(mrfgs.match(*pair(200, 300, seed=seed), device="cpu").disparity)
 
 
-# What makes the children of the tests below.
+# Runs functions in the child processes of the tests below.
 FORKED = '''
 import os, pickle, signal, sys, threading, time, traceback, itertools
 
 def forked(call, leave=os._exit):
-    """What `call` returns in a child; a child that hangs is ended."""
+    """The result of `call` in a forked child, which is killed if it hangs."""
     read, write = os.pipe()
     sys.stdout.flush()
     child = os.fork()
@@ -1818,10 +1818,10 @@ def forked(call, leave=os._exit):
 
 @unittest.skipUnless(hasattr(os, "fork"), "no forks there")
 class Processes(unittest.TestCase):
-    """Children by fork, spawn and forkserver. What hangs is killed, and fails."""
+    """Child processes by fork, spawn and forkserver. A child that hangs is killed, and its test fails."""
 
     def apart(self, code, said, **environment):
-        """That `code`, run by a Python of its own, prints what is `said`."""
+        """Runs `code` in a separate Python, which must print `said`."""
         before = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\nfrom test_mrfgs import *\n"
         with subprocess.Popen([sys.executable, "-c", FORKED + before + textwrap.dedent(code)], stdout=subprocess.PIPE,
                               stderr=subprocess.PIPE, text=True, env={**os.environ, **environment}, start_new_session=True) as process:
@@ -1835,13 +1835,13 @@ class Processes(unittest.TestCase):
     def test_everything_works_in_a_child_as_in_its_parent(self):
         self.apart("""
             matcher = mrfgs.Matcher(device="cpu")
-            # Before anything has run, and after all has.
+            # Before and after any other work.
             same = [forked(everything), forked(lambda: everything(matcher))]
             expected = everything(matcher)
             same += [forked(everything), forked(lambda: everything(matcher)), forked(lambda: everything(matcher), leave=sys.exit)]
-            # A child of a child, and the parent after all of them.
+            # A grandchild, and the parent after all of them.
             same += [forked(lambda: forked(lambda: everything(matcher))), everything(matcher)]
-            # Control: other maps would be seen.
+            # Control: different maps would be detected.
             assert matched_by_a_worker(1) != matched_by_a_worker(2)
             print(*(one == expected for one in same))
         """, " ".join(["True"] * 7))
@@ -1894,7 +1894,7 @@ class Processes(unittest.TestCase):
                 return digest(matcher.match(*pair(), 15).disparity)
 
             print(forked(child, leave=sys.exit) == expected, digest(next(results).disparity) == expected)
-        """, "this iterator was begun before the process was forked, and ends with that; call match_all here\nTrue True")
+        """, "this iterator belongs to the parent of this forked process; call match_all again here\nTrue True")
 
     def test_devices_stay_in_their_process(self):
         if not has_device():
@@ -1919,7 +1919,7 @@ class Processes(unittest.TestCase):
         seeds = [1, 2, 3]
         expected = [matched_by_a_worker(seed) for seed in seeds]
         self.assertEqual(len(set(expected)), 3)
-        # In a time that no hang keeps to.
+        # With a timeout, as a deadlock would not end.
         for way in ("fork", "spawn", "forkserver"):
             with multiprocessing.get_context(way).Pool(2) as pool:
                 self.assertEqual(pool.map_async(matched_by_a_worker, seeds).get(timeout=240), expected, way)
@@ -1936,13 +1936,13 @@ class Processes(unittest.TestCase):
             matcher, counts = mrfgs.Matcher(device="cpu", threads=%d), []
             for call in (lambda: matcher.match(*views), lambda: matcher.match(*views, 15), lambda: list(matcher.match_all([views] * 2))):
                 call()
-                # Whoever has ended may take a moment to go.
+                # Threads may take a moment to end.
                 time.sleep(0.5)
                 counts.append(alive() - before)
             print(*counts)
         """
         self.apart(code % 1, "1 1 1")
-        # Control: others are seen.
+        # Control: additional threads are counted.
         self.apart(code % 3, "3 3 3")
 
     def test_the_environment_says_how_many_threads_are_usual(self):
@@ -1951,7 +1951,7 @@ class Processes(unittest.TestCase):
         nothing = dict.fromkeys(names, "")
         for name in names:
             self.apart(code, one, **{**nothing, name: "1"})
-        # What is said counts more.
+        # An explicit argument takes precedence.
         self.apart(code.replace("'cpu'", "'cpu', threads=3"), "the CPU path, 3 threads", **{**nothing, "OMP_NUM_THREADS": "1"})
         if hasattr(os, "sched_setaffinity"):
             self.apart("os.sched_setaffinity(0, [min(os.sched_getaffinity(0))])\n" + code, one, **nothing)

@@ -1,8 +1,8 @@
-//! What ROS records of a pair of cameras, for mrfgs: images, calibrations, disparities, depths and points.
+//! ROS messages of stereo cameras for mrfgs: images, calibrations, disparities, depths and points.
 //!
-//! [`messages`] has the types of ROS that matter here, in the bytes in which ROS 1 and ROS 2 pass them on. [`pixels`] makes an image of the
-//! library of one of ROS. [`topics`] and [`pairing`] find out which images are pairs. [`recording`] reads MCAP files and bags, and writes
-//! MCAP files. Nothing here knows where messages come from: they may be live.
+//! [`messages`] has the relevant message types in the serializations of ROS 1 and ROS 2. [`pixels`] converts ROS images to the library's.
+//! [`topics`] and [`pairing`] find pairs of topics and of images. [`recording`] reads MCAP files and bags, and writes MCAP files. Apart
+//! from that, messages may come from a recording or a live source.
 
 #![forbid(unsafe_code)]
 

@@ -1,38 +1,38 @@
-//! Images of two cameras that belong together, by the times of their headers.
+//! Pairs images of two cameras by the times in their headers.
 
 use std::collections::BTreeMap;
 
 use crate::messages::{SECOND, Stamp};
 
-/// Most images of a camera that wait for their partners, or for older ones that come later.
+/// Maximum number of images of a camera that wait for a partner, or for older images that arrive later.
 const WAITING: usize = 32;
-/// Most bytes of all that wait, unless a single image has more.
+/// Maximum bytes of all waiting images, unless a single image is larger.
 const BYTES: usize = 128 << 20;
 
-/// How many images gave no pair.
+/// The number of images without a pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Without a partner, of the left and of the right camera.
+    /// Left and right images without a partner.
     pub alone: [usize; 2],
-    /// With the time of another one of the same camera.
+    /// Images with the same time as another one of the same camera.
     pub repeated: usize,
-    /// Behind so many newer ones that they could not be put in order; live, behind a pair that is newer.
+    /// Images too far out of order; live, images older than the last pair.
     pub late: usize,
 }
 
-/// Finds the pairs among images that come in any order, and gives them in the order of their times.
+/// Pairs images that arrive in any order, and returns the pairs ordered by time.
 #[derive(Debug)]
 pub struct Pairing<T> {
     tolerance: u64,
     sides: [BTreeMap<Stamp, (T, usize)>; 2],
     bytes: usize,
-    /// What is as old as this is decided.
+    /// Images up to this time have been decided.
     decided: Option<Stamp>,
     tally: Tally,
 }
 
 impl<T> Pairing<T> {
-    /// Of images whose times differ by at most `tolerance` nanoseconds.
+    /// Pairs images whose times differ by at most `tolerance` nanoseconds.
     #[must_use]
     pub fn new(tolerance: u64) -> Self {
         Self {
@@ -44,7 +44,7 @@ impl<T> Pairing<T> {
         }
     }
 
-    /// Adds an image of the left (0) or right (1) camera, which takes so many bytes.
+    /// Adds an image of `bytes` bytes from the left (0) or right (1) camera.
     pub fn add(&mut self, side: usize, stamp: Stamp, image: T, bytes: usize) {
         if self.sides[side].contains_key(&stamp) {
             self.tally.repeated += 1;
@@ -56,7 +56,7 @@ impl<T> Pairing<T> {
         }
     }
 
-    /// The next pair that is certain, the left image first; with `all` nothing more is to come, and the rest is decided.
+    /// The next definite pair, left image first; `all` means that no more images will come, so the rest is decided.
     pub fn next(&mut self, all: bool) -> Option<[(Stamp, T); 2]> {
         while all || self.is_full() {
             let oldest = self.sides.each_ref().map(|side| side.keys().next().copied());
@@ -79,7 +79,7 @@ impl<T> Pairing<T> {
         None
     }
 
-    /// How many images gave no pair so far.
+    /// The number of images without a pair so far.
     #[must_use]
     pub fn tally(&self) -> Tally {
         self.tally
@@ -89,7 +89,8 @@ impl<T> Pairing<T> {
         self.sides.iter().any(|side| side.len() > WAITING) || self.bytes > BYTES
     }
 
-    /// Whether `other`, the oldest of the other camera and not older, is near enough, and no image of the same camera is nearer to it.
+    /// Whether `other`, the other camera's oldest image and not older than `stamp`, is within tolerance and not closer to this camera's
+    /// next image.
     fn are_partners(&self, side: usize, stamp: Stamp, other: Stamp) -> bool {
         let apart = |a: Stamp, b: Stamp| a.0.abs_diff(b.0);
         let next = self.sides[side].keys().nth(1);
@@ -104,13 +105,12 @@ impl<T> Pairing<T> {
     }
 }
 
-/// Most images of a camera that wait live for their partners.
+/// Maximum number of images of a camera that wait for a live partner.
 const WAITING_LIVE: usize = 8;
-/// A camera whose times go back by more has begun anew: it was started again, or a recording is played again.
+/// If a camera's time jumps back by more than this, it was restarted, or a recording is played again.
 const RESTART: u64 = SECOND.unsigned_abs();
 
-/// Finds the newest pair among images as they arrive, and waits for nothing: a pair is one as soon as its second image is there, and
-/// all images before it are given up.
+/// Pairs live images without delay: a pair is complete as soon as its second image arrives, and all earlier images are dropped.
 #[derive(Debug)]
 pub struct LivePairing<T> {
     tolerance: u64,
@@ -121,8 +121,8 @@ pub struct LivePairing<T> {
 }
 
 impl<T> LivePairing<T> {
-    /// Of images whose times differ by at most `tolerance` nanoseconds. Less than half of the time between two images of a camera leaves
-    /// one partner to each.
+    /// Pairs images whose times differ by at most `tolerance` nanoseconds. Less than half the time between two images of a camera makes
+    /// partners unique.
     #[must_use]
     pub fn new(tolerance: u64) -> Self {
         Self {
@@ -133,7 +133,7 @@ impl<T> LivePairing<T> {
         }
     }
 
-    /// Adds an image of the left (0) or right (1) camera. Returns the pair that it completes, the left image first.
+    /// Adds an image of the left (0) or right (1) camera. Returns the pair that it completes, left image first.
     pub fn add(&mut self, side: usize, stamp: Stamp, image: T) -> Option<[(Stamp, T); 2]> {
         if let Some(last) = self.last[side].filter(|last| stamp <= *last) {
             if stamp.0.abs_diff(last.0) <= RESTART {
@@ -164,13 +164,13 @@ impl<T> LivePairing<T> {
         Some(if side == 0 { [one, other] } else { [other, one] })
     }
 
-    /// How many images gave no pair so far.
+    /// The number of images without a pair so far.
     #[must_use]
     pub fn tally(&self) -> Tally {
         self.tally
     }
 
-    /// Leaves out what waits on a side and is older than `than`, or all.
+    /// Drops the waiting images of a camera that are older than `than`, or all.
     fn give_up(&mut self, side: usize, than: Option<Stamp>) {
         let newer = than.map(|than| self.sides[side].split_off(&than)).unwrap_or_default();
         self.tally.alone[side] += std::mem::replace(&mut self.sides[side], newer).len();
@@ -181,7 +181,7 @@ impl<T> LivePairing<T> {
 mod tests {
     use super::*;
 
-    /// The pairs of live images, `l` or `r` with a time in milliseconds each, in the order in which they arrive.
+    /// The pairs among live images, each `l` or `r` with a time in milliseconds, in order of arrival.
     fn live(tolerance: u64, arriving: &str) -> (String, Tally) {
         let mut pairing = LivePairing::new(tolerance * 1_000_000);
         let mut pairs = Vec::new();
@@ -200,23 +200,23 @@ mod tests {
         let tally = |left, right, repeated, late| Tally { alone: [left, right], repeated, late };
         for (tolerance, arriving, pairs, expected) in [
             (0, "l1 r1 r2 l2", "1=1 2=2", tally(0, 0, 0, 0)),
-            // What is older than a pair has no partner any more.
+            // Images older than a pair have no partner any more.
             (0, "l1 l2 r2 r1 l3 r3", "2=2 3=3", tally(1, 0, 0, 1)),
             (0, "l1 l1 r1 r1 l1", "1=1", tally(0, 0, 3, 0)),
             (0, "l10 r11 l20 r21", "", tally(0, 0, 0, 0)),
             (3, "l10 r11 r19 l20 l30 r40", "10=11 20=19", tally(0, 0, 0, 0)),
             (3, "r8 r11 l10", "10=11", tally(0, 1, 0, 0)),
-            // The clock of the cameras begins anew.
+            // The cameras' clock restarts.
             (0, "l5000 r5000 l6000 l10 r10 r20 l20", "5000=5000 10=10 20=20", tally(1, 0, 0, 0)),
         ] {
             assert_eq!(live(tolerance, arriving), (pairs.into(), expected), "{arriving}");
         }
-        // The right camera is silent: old images are given up.
+        // The right camera is silent, so old images are dropped.
         let all: Vec<_> = (1..=100).map(|ms| format!("l{ms}")).collect();
         assert_eq!(live(0, &all.join(" ")), (String::new(), tally(100 - WAITING_LIVE, 0, 0, 0)));
     }
 
-    /// What is paired of times in milliseconds, and what is not.
+    /// The pairs of images with these times in milliseconds, and the tally.
     fn paired(tolerance: u64, left: &[i64], right: &[i64]) -> (String, Tally) {
         let mut pairing = Pairing::new(tolerance * 1_000_000);
         for (side, times) in [left, right].into_iter().enumerate() {
@@ -236,30 +236,30 @@ mod tests {
         assert_eq!(paired(0, &[1, 2, 5], &[2, 3, 5, 9]), ("2=2 5=5".into(), alone(1, 2)));
         assert_eq!(paired(0, &[10, 20], &[11, 21]), (String::new(), alone(2, 2)));
         assert_eq!(paired(1, &[10, 20], &[11, 19]), ("10=11 20=19".into(), alone(0, 0)));
-        // The nearer one counts, whichever comes first.
+        // The nearer image wins, whichever comes first.
         assert_eq!(paired(6, &[0, 10], &[6]), ("10=6".into(), alone(1, 0)));
         assert_eq!(paired(6, &[5], &[0, 4, 11]), ("5=4".into(), alone(0, 2)));
-        // Both ways: 6 is nearer to 10 than to 0, and 11 is still nearer.
+        // In both directions: 6 is nearer to 10 than to 0, but 11 is nearer still.
         assert_eq!(paired(6, &[0, 10], &[6, 11]), ("10=11".into(), alone(1, 1)));
         let times: Vec<i64> = (0..200).collect();
         assert_eq!(paired(0, &times, &times).0.split(' ').count(), 200);
     }
 
     #[test]
-    fn what_waits_is_bounded() {
+    fn waiting_images_are_bounded() {
         let mut pairing = Pairing::new(0);
-        // The right camera is silent: old images are given up.
+        // The right camera is silent, so old images are dropped.
         for time in 1..=1000 {
             pairing.add(0, Stamp(time), (), 1);
             assert!(pairing.next(false).is_none());
             assert!(pairing.sides[0].len() <= WAITING);
         }
         assert_eq!(pairing.tally().alone, [1000 - WAITING, 0]);
-        // One that is too late, and one that comes twice.
+        // One late and one repeated image.
         pairing.add(1, Stamp(5), (), 1);
         pairing.add(0, Stamp(1000), (), 1);
         assert_eq!((pairing.tally().late, pairing.tally().repeated), (1, 1));
-        // Large images: a single pair passes.
+        // A single pair of large images passes.
         let mut pairing = Pairing::new(0);
         pairing.add(0, Stamp(1), (), BYTES);
         pairing.add(1, Stamp(1), (), BYTES);

@@ -1,4 +1,4 @@
-//! Images of ROS as images of the library.
+//! Conversion of ROS images to the library's.
 
 use std::path::Path;
 
@@ -8,18 +8,18 @@ use mrfgs::image::read::Reader;
 
 use crate::messages::{CompressedImage, Image, Result};
 
-/// What is read, as an error says it.
+/// The supported encodings, for errors.
 const KNOWN: &str = "mono8, mono16, bgr8, rgb8, bgra8, rgba8, their kinds of 16 bits, 8UC1, 8UC3, 8UC4, 16UC1, 16UC3, bayer_*, yuv422 (uyvy), \
-                     yuv422_yuy2 (yuyv), nv12, nv21 and nv24 are read";
+                     yuv422_yuy2 (yuyv), nv12, nv21 and nv24 are supported";
 
 /// The colours of a pixel, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Colours {
     Grey,
-    /// Red first, or blue first; the channels behind them are left out.
+    /// Red first, or blue first; further channels are ignored.
     Rgb,
     Bgr,
-    /// One colour each: those of two pixels of the first row, and of two of the second.
+    /// A Bayer pattern: the colours of two pixels of the first row, then of the second.
     Mosaic([Colour; 4]),
 }
 
@@ -30,11 +30,11 @@ enum Colour {
     Blue,
 }
 
-/// How the samples of an image lie.
+/// The sample layout of an image.
 struct Layout {
     colours: Colours,
     channels: usize,
-    /// Bytes of a sample: 1 or 2.
+    /// Bytes per sample: 1 or 2.
     bytes: usize,
 }
 
@@ -77,20 +77,20 @@ fn mosaic_of(letters: &str) -> Option<[Colour; 4]> {
     })
 }
 
-/// Luma and chroma of 8 bits, as cameras and encoders of films have them.
+/// 8-bit luma and chroma, as sent by cameras and video encoders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Yuv {
-    /// Two pixels in four bytes, and where of these their luma, u and v stand.
+    /// Two pixels in four bytes, with the positions of luma, u and v.
     Packed { luma: [usize; 2], chroma: [usize; 2] },
-    /// All luma, and behind it pairs of chroma in rows as wide as those; where of a pair u and v stand, and how many pixels share one, across
-    /// and down.
+    /// A luma plane, followed by interleaved chroma in rows of the same stride; with the positions of u and v in a pair, and the columns
+    /// and rows of pixels that share a pair.
     Planes { chroma: [usize; 2], shared: (usize, usize) },
 }
 
 impl Yuv {
     fn of(encoding: &str) -> Option<Self> {
         Some(match encoding {
-            // The first name is that of ROS 1, and of ROS 2 before Iron.
+            // The first name is used by ROS 1, and by ROS 2 before Iron.
             "yuv422" | "uyvy" | "UYVY" => Self::Packed { luma: [1, 3], chroma: [0, 2] },
             "yuv422_yuy2" | "yuyv" | "YUYV" | "yuy2" => Self::Packed { luma: [0, 2], chroma: [1, 3] },
             "nv12" | "NV12" => Self::Planes { chroma: [0, 1], shared: (2, 2) },
@@ -100,7 +100,7 @@ impl Yuv {
         })
     }
 
-    /// Bytes of a row of so many pixels; `None` where there is no such row.
+    /// Bytes of a row of `width` pixels; `None` for an invalid width.
     fn row(self, width: usize) -> Option<usize> {
         match self {
             Self::Packed { .. } => width.is_multiple_of(2).then_some(2 * width),
@@ -108,7 +108,7 @@ impl Yuv {
         }
     }
 
-    /// Rows of `step` bytes behind those of luma; a pair for each pixel takes two.
+    /// Number of chroma rows of `step` bytes; a pair per pixel needs two.
     fn more_rows(self, height: usize) -> usize {
         match self {
             Self::Packed { .. } => 0,
@@ -131,10 +131,9 @@ impl Yuv {
     }
 }
 
-/// Red, green and blue of luma and chroma, in the numbers of OpenCV, by which other programs of ROS convert: ITU-R BT.601, where 16 is
-/// black and 235 is white.
+/// RGB from luma and chroma of ITU-R BT.601 (16 is black, 235 white), with the coefficients of OpenCV, which other ROS programs use.
 fn rgb([luma, u, v]: [u8; 3]) -> [u8; 3] {
-    // In 1/2^20 of a level: luma, and what red, green and blue take of chroma.
+    // In 1/2^20 of a level: the scale of luma, and the chroma weights of red, green and blue.
     const LUMA: i32 = 1_220_542;
     let luma = (i32::from(luma) - 16).max(0) * LUMA;
     let [u, v] = [u, v].map(|chroma| i32::from(chroma) - 128);
@@ -142,10 +141,10 @@ fn rgb([luma, u, v]: [u8; 3]) -> [u8; 3] {
     sums.map(|sum| ((sum + (1 << 19)) >> 20).clamp(0, 255) as u8)
 }
 
-/// The image of a message, of at most `max_pixels` pixels. A mosaic of colours becomes colours, by the mean of the nearest samples.
+/// Converts a message of at most `max_pixels` pixels. Bayer patterns are interpolated by the mean of the nearest samples.
 ///
 /// # Errors
-/// Where its encoding is not read, or its numbers contradict each other or its data.
+/// If the encoding is not supported, or the sizes contradict each other or the data.
 pub fn image(message: &Image, max_pixels: u64) -> Result<Raster<'static>> {
     let Image { encoding, data, .. } = message;
     let [width, height, step] = [message.width, message.height, message.step].map(|v| v as usize);
@@ -157,7 +156,7 @@ pub fn image(message: &Image, max_pixels: u64) -> Result<Raster<'static>> {
         return Err(format!("has {width} x {height} pixels").into());
     }
     if width as u64 * height as u64 > max_pixels {
-        return Err(format!("claims {width} x {height} pixels and at most {max_pixels} are read").into());
+        return Err(format!("claims {width} x {height} pixels, but at most {max_pixels} are read").into());
     }
     let row = match (&layout, yuv) {
         (Some(layout), _) => Some(width * layout.channels * layout.bytes),
@@ -165,19 +164,19 @@ pub fn image(message: &Image, max_pixels: u64) -> Result<Raster<'static>> {
     };
     let Some(row) = row else {
         return Err(format!(
-            "{width} is no width of an image in {encoding}, of which two pixels share a colour"
+            "an image in {encoding} cannot be {width} pixels wide, as two pixels share a colour"
         )
         .into());
     };
     if step < row {
         return Err(
-            format!("a row of {width} pixels in {encoding} has {row} bytes, and its step is {step}").into()
+            format!("a row of {width} pixels in {encoding} has {row} bytes, but the step is {step}").into()
         );
     }
     let rows = height + yuv.map_or(0, |yuv| yuv.more_rows(height));
     if step as u64 * rows as u64 > data.len() as u64 {
         return Err(format!(
-            "{rows} rows of {step} bytes are {}, and it has {} bytes of data",
+            "{rows} rows of {step} bytes are {} bytes, but there are {} bytes of data",
             step as u64 * rows as u64,
             data.len()
         )
@@ -202,26 +201,23 @@ pub fn image(message: &Image, max_pixels: u64) -> Result<Raster<'static>> {
     }
 }
 
-/// The image of a message that holds a file, PNG or JPEG. `name` is what errors of the reader call it.
+/// Decodes the PNG or JPEG file in a message, which errors call `name`.
 ///
 /// # Errors
-/// Where the file is damaged, too large or of another format.
+/// If the file is damaged, too large or of another format.
 pub fn compressed(message: &CompressedImage, reader: Reader, name: &Path) -> mrfgs::Result<Raster<'static>> {
     let CompressedImage { format, data, .. } = message;
     if format.contains("compressedDepth") {
-        return Err(mrfgs::Error::read(
-            name,
-            "holds depths, not what a camera has seen; give the topic of an image",
-        ));
+        return Err(mrfgs::Error::read(name, "contains depths, not a camera image; give an image topic"));
     }
     if is_video(format, data) {
         return Err(mrfgs::Error::read(
             name,
-            "holds a part of a film (H.264 or the like) and not an image; decode it first, and give the topic of images",
+            "contains part of a film (such as H.264), not an image; decode it first, and give the image topic",
         ));
     }
     let raster = reader.raster_in_memory(name, data)?;
-    // As `image_transport` packs what it cannot name in OpenCV's colours: the mosaic, in grey.
+    // `image_transport` stores Bayer patterns, which OpenCV cannot name, as grey images.
     let encoding = format.split(';').next().unwrap_or_default().trim();
     match Layout::of(encoding) {
         Some(layout @ Layout { colours: Colours::Mosaic(_), .. }) if raster.channels() == 1 => {
@@ -237,7 +233,7 @@ pub fn compressed(message: &CompressedImage, reader: Reader, name: &Path) -> mrf
     }
 }
 
-/// Whether a compressed image is none, but the next part of a film, by what it is called or how it begins.
+/// Whether a compressed image is actually part of a film, according to its format or first bytes.
 fn is_video(format: &str, data: &[u8]) -> bool {
     let format = format.to_ascii_lowercase();
     let is_called =
@@ -263,7 +259,7 @@ fn raster<S: Copy + Into<u32> + TryFrom<u32> + Default>(
     Raster::new(width, height, channels, made(samples)).map_err(|e| Reason::from(e.to_string()))
 }
 
-/// Red, green and blue of each pixel: its own sample, and the mean of those of another colour among the eight around it, rounded.
+/// RGB of each pixel: its own sample, and the rounded mean of each other colour among its eight neighbours.
 fn demosaiced<S: Copy + Into<u32> + TryFrom<u32> + Default>(
     samples: &[S],
     (width, height): (usize, usize),
@@ -290,7 +286,7 @@ fn demosaiced<S: Copy + Into<u32> + TryFrom<u32> + Default>(
     out
 }
 
-/// The beginning of a text that may be of any length.
+/// The start of a text of arbitrary length.
 fn shortened(text: &str) -> String {
     text.chars().take(40).filter(|c| !c.is_control()).collect()
 }
@@ -323,7 +319,7 @@ mod tests {
             ("rgba8", &[1, 2, 3, 0], &[1, 2, 3]),
             ("bgra8", &[3, 2, 1, 0], &[1, 2, 3]),
         ] {
-            // Two rows of two pixels, with padding that is no pixel.
+            // Two rows of two pixels, with padding.
             let row = [pixel, pixel, &[99, 98]].concat();
             let raster = made(encoding, (2, 2), row.len() as u32, &[&row[..], &row[..]].concat()).unwrap();
             assert_eq!(bytes(&raster), [wanted; 4].concat(), "{encoding}");
@@ -345,7 +341,7 @@ mod tests {
 
     #[test]
     fn mosaics_become_colours() {
-        // Red 10, green 20 and blue 30 everywhere, in each of the four orders.
+        // Red 10, green 20 and blue 30 everywhere, in all four patterns.
         for (encoding, mosaic) in [
             ("bayer_rggb8", [10, 20, 20, 30]),
             ("bayer_bggr8", [30, 20, 20, 10]),
@@ -356,16 +352,16 @@ mod tests {
             let raster = made(encoding, (5, 4), 5, &data).unwrap();
             assert_eq!(bytes(&raster), [10, 20, 30].repeat(20), "{encoding}");
         }
-        // A ramp: means of two and of four neighbours, at the pixel (1, 1) of blue and (1, 0) of green.
+        // A ramp: means of two and of four neighbours, at the blue pixel (1, 1) and the green pixel (1, 0).
         let data: Vec<u8> = (0..16).map(|i| (10 * (i % 4) + i / 4) as u8).collect();
         let raster = bytes(&made("bayer_rggb8", (4, 4), 4, &data).unwrap());
         assert_eq!(raster[3 * 5..][..3], [11, 11, 11]);
         assert_eq!(raster[3..][..3], [10, 10, 11]);
-        // Control: another order gives other colours.
+        // Control: another pattern gives other colours.
         assert_ne!(bytes(&made("bayer_bggr8", (4, 4), 4, &data).unwrap()), raster);
     }
 
-    /// Grey and four colours of ITU-R BT.601, and what OpenCV makes of them, within a level.
+    /// Grey and colours of ITU-R BT.601 with OpenCV's RGB, within a level.
     const COLOURS: [([u8; 3], [u8; 3]); 5] = [
         ([16, 128, 128], [0, 0, 0]),
         ([126, 128, 128], [128, 128, 128]),
@@ -380,7 +376,7 @@ mod tests {
             let off = rgb(yuv).into_iter().zip(wanted).map(|(a, b)| a.abs_diff(b)).max();
             assert!(off <= Some(1), "{:?} for {wanted:?}", rgb(yuv));
         }
-        // Two pairs of colours beside each other; below them the same, so that all kinds hold the same pixels.
+        // Two colours side by side, the same in both rows, so that all encodings represent the same pixels.
         let [(left, of_left), (right, of_right)] = [COLOURS[2], COLOURS[4]];
         let ([y, u, v], [other, s, t]) = (left, right);
         let packed = [[u, y, v, y, s, other, t, other], [y, u, y, v, other, s, other, t]];
@@ -403,25 +399,25 @@ mod tests {
             let off = found.iter().zip(&wanted).map(|(a, b)| a.abs_diff(*b)).max();
             assert!(found.len() == wanted.len() && off <= Some(1), "{encoding}: {found:?}");
         }
-        // Control: the other order of bytes gives other colours.
+        // Control: another byte order gives other colours.
         let found = bytes(&made("uyvy", (4, 2), 10, &rows(&packed[1])).unwrap());
         assert!(found[0].abs_diff(of_left[0]) > 1);
     }
 
     #[test]
-    fn contradictions_are_told() {
+    fn contradictions_are_reported() {
         let data = [0; 64];
         for (encoding, size, step, words) in [
             ("yuv444", (4, 4), 8, "`yuv444`; mono8, mono16"),
-            ("yuv422", (3, 4), 8, "3 is no width of an image in yuv422"),
-            ("uyvy", (4, 9), 8, "9 rows of 8 bytes are 72, and it has 64 bytes"),
-            ("nv12", (8, 6), 8, "9 rows of 8 bytes are 72, and it has 64 bytes"),
-            ("nv24", (8, 3), 8, "9 rows of 8 bytes are 72, and it has 64 bytes"),
+            ("yuv422", (3, 4), 8, "an image in yuv422 cannot be 3 pixels wide"),
+            ("uyvy", (4, 9), 8, "9 rows of 8 bytes are 72 bytes, but there are 64 bytes"),
+            ("nv12", (8, 6), 8, "9 rows of 8 bytes are 72 bytes, but there are 64 bytes"),
+            ("nv24", (8, 3), 8, "9 rows of 8 bytes are 72 bytes, but there are 64 bytes"),
             ("bayer_rgbg8", (4, 4), 4, "`bayer_rgbg8`"),
             ("32FC1", (4, 4), 16, "`32FC1`"),
             ("mono8", (0, 4), 4, "0 x 4 pixels"),
-            ("bgr8", (4, 4), 8, "has 12 bytes, and its step is 8"),
-            ("mono8", (4, 17), 4, "17 rows of 4 bytes are 68, and it has 64 bytes"),
+            ("bgr8", (4, 4), 8, "has 12 bytes, but the step is 8"),
+            ("mono8", (4, 17), 4, "17 rows of 4 bytes are 68 bytes, but there are 64 bytes"),
             ("mono8", (u32::MAX, u32::MAX), u32::MAX, "at most 1048576 are read"),
             ("mono8", (4, 4), u32::MAX, "4 rows of 4294967295 bytes are 17179869180"),
         ] {
@@ -443,12 +439,12 @@ mod tests {
         assert_eq!(bytes(&read("mono8; png compressed ").unwrap()), grey.clone().into_raw());
         let colours = read("bayer_rggb8; png compressed ").unwrap();
         assert_eq!(bytes(&colours), bytes(&made("bayer_rggb8", (4, 4), 4, grey.as_raw()).unwrap()));
-        assert!(read("16UC1; compressedDepth png").unwrap_err().to_string().contains("holds depths"));
+        assert!(read("16UC1; compressedDepth png").unwrap_err().to_string().contains("contains depths"));
         let said = read("h264").unwrap_err().to_string();
-        assert!(said.contains("H.264 or the like") && said.contains("decode it first"), "{said}");
+        assert!(said.contains("such as H.264") && said.contains("decode it first"), "{said}");
         let data = [0, 0, 0, 1, 0x67, 0x64][..].into();
         let message = CompressedImage { format: "jpeg".into(), data, ..CompressedImage::default() };
         let said = compressed(&message, Reader::default(), Path::new("a.mcap")).unwrap_err().to_string();
-        assert!(said.contains("H.264 or the like"), "{said}");
+        assert!(said.contains("such as H.264"), "{said}");
     }
 }

@@ -1,10 +1,10 @@
-"""Renders the recipe beside it for all systems, by py-rattler-build, and prints what it makes: NAME VERSION, one a line."""
+"""Renders the recipe in this folder for all systems with py-rattler-build, and prints its packages: NAME VERSION, one per line."""
 import sys
 from pathlib import Path
 
 from rattler_build import PlatformConfig, RattlerBuildError, RecipeParseError, RenderConfig, Stage0Recipe, VariantConfig
 
-# What conda-forge pins.
+# conda-forge's pins.
 PINNED = VariantConfig.from_yaml("python: [3.12.*]\nc_stdlib: [sysroot]\n")
 found = set()
 try:

@@ -1,7 +1,7 @@
-//! Bodies, and where rays meet them.
+//! Bodies and their intersections with rays.
 
 use super::paint::Paint;
-use super::vector::{Frame, Vec3, add, dot, scale, sub, unit};
+use super::vector::{Basis, Vec3, add, dot, scale, sub, unit};
 
 /// The points `from + t * along`. For a camera's ray t is the depth, because `along` has z = 1.
 pub struct Ray {
@@ -30,7 +30,7 @@ pub enum Shape {
     Sphere {
         radius: f64,
     },
-    /// An open tube along the frame's z, `half` to either side of the centre.
+    /// An open tube along the frame's z axis, `half` long to either side of the centre.
     Tube {
         radius: f64,
         half: f64,
@@ -40,15 +40,15 @@ pub enum Shape {
 pub struct Body {
     shape: Shape,
     centre: Vec3,
-    frame: Frame,
-    /// Square of the distance from the centre within which all of it lies, and a little more.
+    frame: Basis,
+    /// Square of a radius that slightly exceeds the body's.
     reach: f64,
     pub paint: Paint,
     pub seed: u32,
 }
 
 impl Body {
-    pub fn new(shape: Shape, centre: Vec3, frame: Frame, paint: Paint, seed: u32) -> Self {
+    pub fn new(shape: Shape, centre: Vec3, frame: Basis, paint: Paint, seed: u32) -> Self {
         let reach = 1.001
             * match shape {
                 Shape::Flat { half, .. } => half[0] * half[0] + half[1] * half[1],
@@ -58,12 +58,12 @@ impl Body {
         Self { shape, centre, frame, reach, paint, seed }
     }
 
-    /// Where the ray first meets the body, beyond t = 0.
+    /// The first intersection of the ray with t > 0.
     pub fn meet(&self, ray: &Ray) -> Option<f64> {
         let from = sub(ray.from, self.centre);
         let (a, b, c) = (dot(ray.along, ray.along), dot(ray.along, from), dot(from, from));
         if b * b < a * (c - self.reach) {
-            return None; // past all of it, and most rays are
+            return None; // most rays miss the bounding sphere
         }
         match self.shape {
             Shape::Flat { half, outline } => {
@@ -93,7 +93,7 @@ impl Body {
         }
     }
 
-    /// The point `p` of the surface in the body's own coordinates, and the surface's normal there.
+    /// The surface point `p` in body coordinates, and the normal there.
     pub fn surface(&self, p: Vec3) -> (Vec3, Vec3) {
         let local = self.frame.local(sub(p, self.centre));
         let normal = match self.shape {
@@ -105,7 +105,7 @@ impl Body {
     }
 }
 
-/// The solutions of a t^2 + 2 b t + c = 0, the smaller one first.
+/// The roots of a t^2 + 2 b t + c = 0, smaller one first.
 fn roots(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
     let discriminant = b * b - a * c;
     (discriminant > 0.0).then(|| {

@@ -1,9 +1,9 @@
-//! Noise that is the same on every machine.
+//! Noise that is identical on every machine.
 
 use super::vector::{Vec3, scale};
 
-/// Noise of standard deviation about 1 in octaves from `cell` down to about two pixels, each `gain` times as
-/// strong as the one before. Octaves fade with depth, hence alike in both views.
+/// Noise with a standard deviation of about 1 in octaves from `cell` down to about two pixels, each `gain` times as strong as the one
+/// before. Octaves fade with depth, and therefore alike in both views.
 pub fn octaves(p: Vec3, cell: f64, pixel: f64, gain: f64, seed: u32) -> f64 {
     let (mut q, mut cell, mut weight) = (scale(p, 1.0 / cell), cell, 1.0);
     let (mut sum, mut power) = (0.0, 0.0);
@@ -15,7 +15,7 @@ pub fn octaves(p: Vec3, cell: f64, pixel: f64, gain: f64, seed: u32) -> f64 {
         let w = if octave == 0 { weight } else { weight * fade };
         sum += w * noise(q, seed.wrapping_add(octave.wrapping_mul(0x51ed_270b)));
         power += w * w;
-        // Twice as fine, and turned (3-4-5) so that the lattices do not line up.
+        // Twice as fine, and rotated (3-4-5) so that the lattices do not line up.
         q = [1.6 * q[0] - 1.2 * q[1], 1.2 * q[0] + 1.6 * q[1], 2.0 * q[2]];
         cell *= 0.5;
         weight *= gain;
@@ -41,7 +41,7 @@ pub fn noise(p: Vec3, seed: u32) -> f64 {
     if w == 0.0 { layer(0) } else { blend(layer(0), layer(1), w) }
 }
 
-/// A random-looking word for each input.
+/// A pseudo-random word for each input.
 pub fn hash([a, b, c, d]: [u32; 4]) -> u32 {
     let mut h = a.wrapping_mul(0x9e37_79b1);
     h = h.wrapping_add(b.wrapping_mul(0x85eb_ca77)).wrapping_add(c.wrapping_mul(0xc2b2_ae3d));

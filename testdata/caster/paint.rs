@@ -1,36 +1,36 @@
-//! The textures of bodies.
+//! Textures of bodies.
 
 use super::noise::{noise, octaves};
 use super::vector::{Vec3, mix, scale};
 
 #[derive(Clone, Copy)]
 pub enum Pattern {
-    /// The first colour alone.
+    /// Only the first colour.
     Plain,
-    /// A slow change between the two colours, over about this length.
+    /// A slow gradient between the two colours, over about this length.
     Wash(f64),
     /// Patches of this size with ragged borders.
     Blotches(f64),
-    /// Stripes across the body's x, with this period.
+    /// Stripes along the body's x axis, with this period.
     Stripes(f64),
-    /// Rings across the body's z, with this period.
+    /// Rings along the body's z axis, with this period.
     Rings(f64),
     /// Cubes of this size.
     Checker(f64),
 }
 
-/// A pattern of two colours under a band-limited grain that is carved out of the solid.
+/// A pattern of two colours with band-limited grain, as a solid texture.
 #[derive(Clone, Copy)]
 pub struct Paint {
     pattern: Pattern,
     colours: [Vec3; 2],
-    /// Standard deviation of the grain, as a part of the colour.
+    /// Standard deviation of the grain, relative to the colour.
     grain: f64,
     /// Size of the coarsest grain.
     cell: f64,
-    /// The part of the light that it mirrors, besides what it has of its own.
+    /// Fraction of the light that is reflected as by a mirror, in addition to the diffuse colour.
     pub gloss: f64,
-    /// Factors on the body's coordinates before the grain is looked up: below 1 draws it out.
+    /// Scale of the body coordinates before the lookup of the grain: below 1 stretches it.
     stretch: Vec3,
 }
 
@@ -53,7 +53,7 @@ impl Paint {
         Self { gloss, ..self }
     }
 
-    /// The colour at a point of the body; no detail is much finer than `pixel`.
+    /// The colour at a point of the body; details finer than about `pixel` are suppressed.
     pub fn colour(&self, p: Vec3, pixel: f64, seed: u32) -> Vec3 {
         let odd = |cells: f64| if cells.floor() as i64 & 1 == 0 { 0.0 } else { 1.0 };
         let t = match self.pattern {

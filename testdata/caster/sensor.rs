@@ -1,41 +1,39 @@
-//! What cameras record.
+//! Camera sensors.
 
 use super::noise::hash;
 use super::vector::Vec3;
 
-/// Where the point (x, y) of an image is, from its middle, when the image is one unit high.
+/// Position of the image point (x, y) relative to the centre, in image heights.
 pub fn place((width, height): (usize, usize), x: f64, y: f64) -> [f64; 2] {
     let scale = height as f64;
     [(x - middle(width)) / scale, (y - middle(height)) / scale]
 }
 
-/// The middle of so many pixels.
 pub fn middle(pixels: usize) -> f64 {
     0.5 * (pixels - 1) as f64
 }
 
-/// What turns light (1 is white) into bytes.
+/// Converts light (1 is white) to bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensor {
     pub gain: f64,
-    /// The part of the light that is lost one image height away from `brightest`; it grows with the square of the
-    /// distance.
+    /// Fraction of the light lost one image height away from `brightest`; it grows with the square of the distance.
     pub fall_off: f64,
-    /// The place in the image that gets all light, in image heights from its middle.
+    /// Image position without vignetting, in image heights from the centre.
     pub brightest: [f64; 2],
     /// Added after the gain, in grey levels.
     pub offset: f64,
-    /// Standard deviation in grey levels.
+    /// Standard deviation of the noise, in grey levels.
     pub noise: f64,
-    /// How far below its place everything is recorded, in pixels: the camera is not adjusted.
+    /// Vertical misalignment: how much lower everything is recorded, in pixels.
     pub lower: f64,
-    /// Side of the square from which a pixel gets its light, in pixels: 1 in focus, more out of it.
+    /// Side of the square from which a pixel collects light, in pixels: 1 in focus, more when out of focus.
     pub spread: f64,
     seed: u32,
 }
 
 impl Sensor {
-    /// One in focus with a little noise, which gets all light.
+    /// A sensor in focus with a little noise and no vignetting.
     pub fn new(seed: u32) -> Self {
         Self {
             gain: 1.0,
@@ -49,17 +47,17 @@ impl Sensor {
         }
     }
 
-    /// The grey level that light makes at (x, y) of an image of this size, but for the noise.
+    /// The grey level for light at (x, y) in an image of this size, without noise.
     pub fn level(&self, light: f64, size: (usize, usize), x: f64, y: f64) -> f64 {
         255.0 * self.gain * light * self.passes(size, x, y) + self.offset
     }
 
-    /// The light that makes this grey level at (x, y): [`Self::level`] the other way round.
+    /// The light for a grey level at (x, y): the inverse of [`Self::level`].
     pub fn light(&self, level: f64, size: (usize, usize), x: f64, y: f64) -> f64 {
         (level - self.offset) / (255.0 * self.gain * self.passes(size, x, y))
     }
 
-    /// The part of the light that reaches (x, y).
+    /// Fraction of the light that reaches (x, y).
     fn passes(&self, size: (usize, usize), x: f64, y: f64) -> f64 {
         let [u, v] = place(size, x, y);
         let [u, v] = [u - self.brightest[0], v - self.brightest[1]];

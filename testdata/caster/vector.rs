@@ -1,4 +1,4 @@
-//! Points and directions.
+//! Vectors and frames.
 
 pub type Vec3 = [f64; 3];
 
@@ -30,12 +30,12 @@ pub fn mix(a: Vec3, b: Vec3, t: f64) -> Vec3 {
     add(scale(a, 1.0 - t), scale(b, t))
 }
 
-/// Three perpendicular unit vectors: the body's own x, y and z.
+/// An orthonormal frame: the body's x, y and z axes.
 #[derive(Clone, Copy)]
-pub struct Frame(pub [Vec3; 3]);
+pub struct Basis(pub [Vec3; 3]);
 
-impl Frame {
-    /// z along `z`, y as close to `y` as that allows.
+impl Basis {
+    /// A frame with z along `z`, and y as close to `y` as possible.
     pub fn new(z: Vec3, y: Vec3) -> Self {
         let z = unit(z);
         let x = unit(cross(y, z));

@@ -1,6 +1,6 @@
-// Makes the package for npm in target/web/npm, where scripts/web has left the engine.
+// Builds the npm package in target/web/npm, where scripts/web has put the engine.
 //
-//   node web/npm/build.mjs VERSION REPOSITORY LICENCES   REPOSITORY may be empty; LICENCES is the file with those of all that is inside
+//   node web/npm/build.mjs VERSION REPOSITORY LICENCES   REPOSITORY may be empty; LICENCES is the file with the licences of all dependencies
 import { copyFileSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';

@@ -1,20 +1,20 @@
-// What a matcher and its worker say to each other. Each call has one answer; progress comes in between.
+// Messages between a matcher and its worker. Each call has one reply; progress messages may precede it.
 
 export interface Reason {
-    /** The value of one bit of `reasons`; 0 is that of a pixel without any, which was measured and is trusted. */
+    /** One bit of `reasons` as a value; 0 stands for pixels without flags, which were measured and are reliable. */
     bit: number;
     name: string;
     about: string;
 }
 
-/** A view in memory: rows from the top without gaps, of 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA) samples for each pixel. */
+/** An image in memory: rows from the top without gaps, with 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA) samples per pixel. */
 export interface View {
     data: Uint8Array | Uint8ClampedArray | Uint16Array;
     width: number;
     height: number;
 }
 
-/** What every `ImageBitmap` is; so the types need no library of a browser. */
+/** The interface of `ImageBitmap`, declared here so that the types do not require the DOM library. */
 export interface Bitmap {
     readonly width: number;
     readonly height: number;
@@ -24,36 +24,36 @@ export interface Bitmap {
 export interface Match {
     width: number;
     height: number;
-    /** In pixels, row by row; +Infinity where there is none. */
+    /** In pixels, row by row; +Infinity where missing. */
     disparity: Float32Array;
     /** 0 to 255 for each pixel. */
     confidence: Uint8Array;
-    /** Why each pixel is what it is: bits, which `Matcher.reasons` explains. */
+    /** Flags of each pixel: `Matcher.reasons` explains the bits. */
     reasons: Uint8Array;
-    /** The disparities that were searched, both ends included. */
+    /** The range of disparities searched, inclusive. */
     minDisparity: number;
     maxDisparity: number;
-    /** What ran it, for people. */
+    /** The device that ran the match, for display. */
     device: string;
-    /** Why it did not run on the GPU, where one was to be taken. */
+    /** Why the match did not run on the GPU, if it was to. */
     note: string | undefined;
-    /** What is probably wrong with the pair or the range, with the remedy. */
+    /** Likely problems of the pair or the range, with remedies. */
     warnings: string[];
 }
 
-/** What a worker says of the device that it has opened. */
+/** The properties of the opened device and the engine. */
 export interface Opened {
     version: string;
     device: string;
     note: string | undefined;
-    /** The names of all presets. */
+    /** Names of all presets. */
     presets: string[];
     reasons: Reason[];
 }
 
 export interface Calls {
     open(device: 'auto' | 'cpu' | 'webgpu'): Opened;
-    /** Without a range, the one that sparse matches find. */
+    /** Matches over the range, or over the one found by sparse matching if none is given. */
     match(left: View, right: View, method: string, range: [number, number] | undefined): Match;
 }
 
@@ -63,5 +63,5 @@ export type Reply =
     | { id: number; value: ReturnType<Calls[keyof Calls]> }
     | { id: number; error: string }
     | { stage: string; done: number }
-    /** The engine cannot go on: the worker is of no use any more. */
+    /** The engine has crashed, and the worker must be replaced. */
     | { broken: string };

@@ -1,10 +1,10 @@
-// The worker's side: the engine, and what answers calls with it.
+// The worker's side: runs the engine and answers calls.
 
 import * as engine from 'engine';
 import { broken, buffers, own, words } from '../page/answers.js';
 import type { Calls, Opened, Reason, Reply, Request, View } from './calls.js';
 
-/** Answers requests once `load` has the engine ready. */
+/** Returns a handler of requests, which loads the engine with `load` first. */
 export function answering(load: () => Promise<unknown>, post: (reply: Reply, moved: ArrayBuffer[]) => void): (request: Request) => void {
     let matcher: engine.Matcher | undefined;
 
@@ -38,7 +38,7 @@ export function answering(load: () => Promise<unknown>, post: (reply: Reply, mov
             const pair = keep(pairOf(left, right));
             const range = given ? new engine.Range(...given) : pair.range();
             if (range === undefined) {
-                throw new Error('no range of disparities is found: give minDisparity and maxDisparity');
+                throw new Error('the disparity range cannot be determined: give minDisparity and maxDisparity');
             }
             keep(range);
             const warnings = pair.warnings(given && new engine.Range(...given)) as { text: string }[];
@@ -60,7 +60,7 @@ export function answering(load: () => Promise<unknown>, post: (reply: Reply, mov
                 try {
                     value.free();
                 } catch {
-                    // After a trap nothing can be freed; the trap is what is told.
+                    // After a trap nothing can be freed; the error of the trap is reported.
                 }
             }
         }
@@ -84,7 +84,7 @@ function pairOf(left: View, right: View): engine.StereoPair {
         return engine.StereoPair.of_samples16(l, sizes[0], sizes[1], r, sizes[2], sizes[3]);
     }
     if (l instanceof Uint16Array || r instanceof Uint16Array) {
-        throw new Error('one view has 8 bits and the other 16: give both in one format');
+        throw new Error('one image has 8 bits and the other 16: give both in the same format');
     }
     const bytes = (data: Uint8Array | Uint8ClampedArray) => new Uint8Array(data.buffer, data.byteOffset, data.length);
     return engine.StereoPair.of_samples8(bytes(l), sizes[0], sizes[1], bytes(r), sizes[2], sizes[3]);

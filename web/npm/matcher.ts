@@ -1,4 +1,4 @@
-// A matcher: what programs hold, and its worker's other end.
+// The matcher that programs use, and its end of the worker's messages.
 
 import type { Bitmap, Calls, Match, Opened, Reason, Reply, Request, View } from './calls.js';
 
@@ -7,24 +7,24 @@ export type { Bitmap, Match, Reason, View };
 export interface Options {
     /** A preset: `default`, `accurate`, `fast`, `paper` or `fgs`. */
     method?: 'default' | 'accurate' | 'fast' | 'paper' | 'fgs';
-    /** `auto` takes WebGPU where there is a device, and else the CPU. Node.js has the CPU alone. */
+    /** `auto` uses WebGPU if available, and otherwise the CPU. Node.js has only the CPU. */
     device?: 'auto' | 'cpu' | 'webgpu';
 }
 
 export interface MatchOptions {
-    /** The disparities to search, in pixels, both ends included. Without `maxDisparity` sparse matches give the range. */
+    /** The disparities to search, in pixels, inclusive. Without `maxDisparity`, sparse matching finds the range. */
     minDisparity?: number;
     maxDisparity?: number;
-    /** Ends the match, and with it the worker; the next match starts another. */
+    /** Aborts the match by ending the worker; the next match starts another one. */
     signal?: AbortSignal;
-    /** Hears how much of the match is done, 0 to 1. */
+    /** Called with the fraction of the match done, 0 to 1. */
     onProgress?: (done: number, stage: string) => void;
 }
 
-/** A worker, of a browser or of Node.js. */
+/** A worker of a browser or of Node.js. */
 export interface Port {
     post(request: Request): void;
-    /** Whether the process waits for it. */
+    /** Whether the process must stay alive for it. */
     busy(is: boolean): void;
     end(): void;
 }
@@ -36,15 +36,15 @@ const DEVICES = ['auto', 'cpu', 'webgpu'];
 export class Matcher {
     /** The version of mrfgs. */
     readonly version: string;
-    /** What the bits of a match's `reasons` say. */
+    /** Explanation of the bits in a match's `reasons`. */
     readonly reasons: readonly Reason[];
-    /** What runs matches, for people. */
+    /** The device that runs matches, for display. */
     readonly device: string;
-    /** Why it is not the GPU, where `auto` found none. */
+    /** Why it is not the GPU, if `auto` found none. */
     readonly note: string | undefined;
     private queue: Promise<unknown> = Promise.resolve();
 
-    /** `createMatcher` makes them. */
+    /** Use `createMatcher` instead. */
     constructor(
         private readonly link: Link,
         private readonly method: string,
@@ -56,14 +56,14 @@ export class Matcher {
         this.note = note;
     }
 
-    /** Matches a rectified pair. Calls wait for one another. */
+    /** Matches a rectified pair. Concurrent calls run one after another. */
     match(left: View | Bitmap, right: View | Bitmap, options: MatchOptions = {}): Promise<Match> {
         const next = this.queue.then(() => this.run(left, right, options));
         this.queue = next.catch(() => {});
         return next;
     }
 
-    /** Ends the worker, and frees its memory. A match that runs fails. */
+    /** Ends the worker and frees its memory. A running match fails. */
     close(): void {
         this.link.close();
     }
@@ -93,7 +93,7 @@ export class Matcher {
     }
 }
 
-/** Calls as promises, and a new worker in place of one that broke or was ended. */
+/** Turns calls into promises, and replaces a worker that crashed or was ended. */
 export class Link {
     onProgress: MatchOptions['onProgress'];
     private port: Port | undefined;
@@ -108,7 +108,7 @@ export class Link {
 
     open(): Promise<Opened> {
         const port: Port = this.start(
-            // What an ended worker still says counts no more.
+            // Messages from an ended worker are ignored.
             (reply) => port === this.port && this.hear(reply),
             (reason) => port === this.port && this.fail(new Error(`the worker of @mrfgs/wasm failed: ${reason}`)),
         );
@@ -126,7 +126,7 @@ export class Link {
         return this.send(name, ...args);
     }
 
-    /** Ends the worker and all that waits for it. */
+    /** Ends the worker and rejects all pending calls. */
     fail(reason: unknown): void {
         this.port?.end();
         this.port = undefined;
@@ -153,7 +153,7 @@ export class Link {
 
     private hear(reply: Reply): void {
         if ('broken' in reply) {
-            this.fail(new Error(`the engine of @mrfgs/wasm broke: ${reply.broken}`));
+            this.fail(new Error(`the engine of @mrfgs/wasm crashed: ${reply.broken}`));
         } else if ('stage' in reply) {
             this.onProgress?.(reply.done, reply.stage);
         } else {
@@ -169,7 +169,7 @@ export class Link {
     }
 }
 
-/** A matcher whose worker `start` starts. */
+/** Creates a matcher with a worker started by `start`. */
 export async function opened(start: Start, { method = 'default', device = 'auto' }: Options): Promise<Matcher> {
     known('device', device, DEVICES);
     const link = new Link(start, device);
@@ -185,7 +185,7 @@ export async function opened(start: Start, { method = 'default', device = 'auto'
 
 function known(name: string, value: string, all: readonly string[]): void {
     if (!all.includes(value)) {
-        throw new TypeError(`${name} is ${JSON.stringify(value)}: take ${all.join(', ')}`);
+        throw new TypeError(`${name} is ${JSON.stringify(value)}: use ${all.join(', ')}`);
     }
 }
 
@@ -194,7 +194,7 @@ function viewOf(view: View | Bitmap, name: string): View {
         const { width, height } = view;
         const context = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });
         if (context === null) {
-            throw new Error(`${name}: this browser gives no canvas to read an ImageBitmap: give its ImageData`);
+            throw new Error(`${name}: this browser cannot read an ImageBitmap: give its ImageData`);
         }
         context.drawImage(view, 0, 0);
         return viewOf(context.getImageData(0, 0, width, height), name);
@@ -205,7 +205,7 @@ function viewOf(view: View | Bitmap, name: string): View {
     }
     const channels = data.length / (Number(width) * Number(height));
     if (![1, 2, 3, 4].includes(channels)) {
-        throw new TypeError(`${name}: ${data.length} samples are not 1 to 4 for each of ${String(width)} x ${String(height)} pixels`);
+        throw new TypeError(`${name}: ${data.length} samples do not fit ${String(width)} x ${String(height)} pixels with 1 to 4 samples each`);
     }
     return { data, width: Number(width), height: Number(height) };
 }

@@ -1,4 +1,4 @@
-// The worker in Node.js.
+// The worker for Node.js.
 
 import { readFile } from 'node:fs/promises';
 import { parentPort } from 'node:worker_threads';

@@ -1,4 +1,4 @@
-// The worker in browsers.
+// The worker for browsers.
 
 import init from 'engine';
 import { answering } from './engine.js';
@@ -6,10 +6,10 @@ import { answering } from './engine.js';
 declare const self: DedicatedWorkerGlobalScope;
 
 const answer = answering(
-    // Bundlers take the file along for the sake of this line.
+    // Bundlers include the file because of this expression.
     () => init({ module_or_path: new URL('./mrfgs_web_bg.wasm', import.meta.url) }),
     (reply, moved) => self.postMessage(reply, moved),
 );
 self.addEventListener('message', ({ data }) => answer(data));
-// A trap in what nothing awaits.
+// Reports a trap in a promise that nothing awaits.
 self.addEventListener('unhandledrejection', ({ reason }) => self.postMessage({ broken: String(reason) }));

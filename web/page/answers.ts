@@ -1,6 +1,6 @@
-// What workers share that answer calls with what the engine gives.
+// Shared by the workers: conversion of results of the engine to replies.
 
-/** The memory of all arrays in a value: it moves instead of being copied. */
+/** The buffers of all arrays in a value, to be transferred instead of copied. */
 export function buffers(value: unknown): ArrayBuffer[] {
     if (ArrayBuffer.isView(value)) {
         return [value.buffer as ArrayBuffer];
@@ -8,19 +8,19 @@ export function buffers(value: unknown): ArrayBuffer[] {
     return value && typeof value === 'object' ? [...new Set(Object.values(value).flatMap(buffers))] : [];
 }
 
-/** The engine's arrays are copies of their own, never views of its memory. */
+/** The engine returns copies of its arrays, never views of its memory. */
 export function own(array: Float32Array): Float32Array<ArrayBuffer>;
 export function own(array: Uint8Array): Uint8Array<ArrayBuffer>;
 export function own(array: Float32Array | Uint8Array): Float32Array | Uint8Array {
     return array;
 }
 
-/** A trap leaves the engine's memory as it was in mid-work: nothing can be trusted after it. */
+/** After a trap the memory of the engine is in an undefined state, and the engine must not be used again. */
 export function broken(error: unknown): boolean {
     return error instanceof WebAssembly.RuntimeError || error instanceof RangeError || error instanceof InternalError();
 }
 
-/** Firefox's own, which ends what takes too much stack; elsewhere a class that nothing is of. */
+/** Firefox throws it when the stack overflows; elsewhere a class without instances stands in. */
 function InternalError(): new () => object {
     return (globalThis as unknown as { InternalError?: new () => object }).InternalError ?? class {};
 }

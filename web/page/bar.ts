@@ -1,9 +1,9 @@
-// The bar of a match that runs, and what is said beside it.
+// The progress bar of a match and the text beside it.
 
 import { by, say } from './dom';
 import { left, phase } from './stages';
 
-/** Empties the bar. Call what it returns with each stage that begins and with the share of the match that is done, 0 to 1. */
+/** Resets the bar. The result is to be called with each stage, and with the fraction of the match done, 0 to 1. */
 export function followed(): (stage: string, done: number) => void {
     const bar = by<HTMLProgressElement>('progress');
     let said = 0;
@@ -13,7 +13,7 @@ export function followed(): (stage: string, done: number) => void {
     say('stage', 'Getting ready');
     return (stage, done) => {
         if (done < last) {
-            // A second match, over a wider range.
+            // A second match over a wider range.
             [since, said] = [performance.now(), 0];
         }
         [last, bar.value] = [done, done];

@@ -1,15 +1,15 @@
-// The page's side of the worker: calls as promises, and a new worker in place of one that broke or does not stop.
+// The page's end of the worker: turns calls into promises, and replaces a worker that crashed or does not stop.
 
 import { words } from './dom';
 import type { Calls, Facts, Name, Reply, Request } from './protocol';
 
-/** The user stopped what ran. */
+/** The user stopped the call. */
 export class Interrupted extends Error {}
 
-/** The worker is gone, and with it the pair and the maps that it held. There is a new one. */
+/** The worker crashed and was replaced; the pair and maps that it held are lost. */
 export class Broken extends Error {}
 
-/** What went wrong, in words. */
+/** The message for an error. */
 export function explained(error: unknown): string {
     const memory = /memory|allocation|unreachable|out of bounds/i.test(words(error));
     return error instanceof Broken
@@ -17,7 +17,7 @@ export function explained(error: unknown): string {
         : words(error);
 }
 
-/** The longest that a worker may take to stop, in milliseconds. */
+/** Time in ms in which a worker must stop before it is replaced. */
 const PATIENCE = 2500;
 
 interface Waiting {
@@ -27,30 +27,30 @@ interface Waiting {
 }
 
 export class Client {
-    /** Called with the stage that runs and how much of the match is done, 0 to 1. */
+    /** Called with the current stage and the fraction of the match done, 0 to 1. */
     onProgress: (stage: string, done: number) => void = () => {};
-    /** How many workers there were before this one: what an earlier one held is lost. */
+    /** Number of workers before this one; data held by earlier ones is lost. */
     generation = 0;
-    /** What the engine says of itself once it is there. */
+    /** Properties of the engine, once it is loaded. */
     facts: Promise<Facts>;
     private worker!: Worker;
     private started = false;
     private waiting = new Map<number, Waiting>();
     private last = 0;
-    /** Called once a call has ended. */
+    /** Called when a call has ended. */
     private ended: (() => void)[] = [];
 
     constructor(private readonly script: URL) {
         this.facts = this.hire();
     }
 
-    /** Asks the worker, once it has started. */
+    /** Calls the worker, once it has started. */
     async call<N extends Name>(name: N, ...args: Parameters<Calls[N]>): Promise<ReturnType<Calls[N]>> {
         await this.facts;
         return this.send(name, ...args);
     }
 
-    /** Asks on behalf of what `signal` ends: nothing is asked after that, and no answer counts. */
+    /** A `call` that is cancelled by `signal`: it then sends nothing and ignores replies. */
     within(signal: AbortSignal): Client['call'] {
         return async (name, ...args) => {
             signal.throwIfAborted();
@@ -64,7 +64,7 @@ export class Client {
         };
     }
 
-    /** Ends all calls but those that open a device: by asking, and after a while by ending the worker. */
+    /** Cancels all calls except those that open a device; a worker that does not respond in time is replaced. */
     async cancel(): Promise<void> {
         const calls = [...this.waiting].filter(([, { name }]) => name !== 'open').map(([id]) => id);
         if (!this.started || calls.length === 0) {
@@ -91,7 +91,7 @@ export class Client {
         this.worker = worker;
         this.started = false;
         worker.addEventListener('message', ({ data }: MessageEvent<Reply>) => {
-            // What an ended worker still says counts no more.
+            // Messages from a replaced worker are ignored.
             if (worker === this.worker) {
                 this.take(data);
             }
@@ -131,7 +131,7 @@ export class Client {
         this.worker.terminate();
         const waiting = [...this.waiting.values()];
         this.waiting.clear();
-        // One that could not start would not start a second time.
+        // A worker that failed to start is not restarted.
         if (this.started) {
             this.generation += 1;
             this.facts = this.hire();

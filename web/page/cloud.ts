@@ -1,4 +1,4 @@
-// Points in 3-D. A chunk of its own: it brings three.js and is loaded when it is first looked at.
+// The 3-D view of the points, in a separate chunk with three.js that is loaded on first use.
 
 import {
     BufferAttribute,
@@ -16,7 +16,7 @@ import { step } from './dom';
 import type { Cameras, Cloud } from './protocol';
 import { calm } from './visitor';
 
-// A point is as large as its pixel is at its depth, so that a surface seen from the front has no holes.
+// Points have the size of their pixel at their depth, so that surfaces seen from the front have no holes.
 const VERTEX = `
     attribute float confidence;
     uniform float least, footprint, projection;
@@ -36,11 +36,11 @@ const FRAGMENT = `
         gl_FragColor = vec4(tint, 1.0);
     }`;
 
-/** Degrees that an arrow key turns. */
+/** Rotation per arrow key in degrees. */
 const TURN = 5;
-/** How long new points swing, how often in that time, and how far to each side. */
+/** How long new points swing, how many times, and how far to each side. */
 const SWING = { milliseconds: 16_000, times: 2, radians: 0.24 };
-/** After so many frames that take longer than this, the points stand still, so that the page has time for other things. */
+/** After this many frames slower than this, the swinging stops, so that the page remains responsive. */
 const SLOW = { milliseconds: 100, frames: 30 };
 
 export class CloudView {
@@ -57,10 +57,10 @@ export class CloudView {
     private points: Points | undefined;
     private rig: { cameras: Cameras; width: number; height: number } | undefined;
     private due = 0;
-    /** Where nobody has taken hold of the points yet. */
+    /** Whether the points may swing: until the user first moves them. */
     private swings = !calm();
 
-    /** `swinging` is told when the points begin and end to swing. Throws where the browser has no WebGL. */
+    /** `swinging` is called when the points start and stop swinging. Throws if the browser has no WebGL. */
     constructor(
         private readonly canvas: HTMLCanvasElement,
         private readonly swinging: (swings: boolean) => void,
@@ -78,7 +78,7 @@ export class CloudView {
         new ResizeObserver(() => this.resize()).observe(canvas);
     }
 
-    /** Shows other points. The view stays as it is if they are of the same size and cameras. */
+    /** Shows other points. The view is kept if size and cameras are the same. */
     show(cloud: Cloud, cameras: Cameras, width: number, height: number): void {
         this.clear();
         const geometry = new BufferGeometry();
@@ -86,9 +86,9 @@ export class CloudView {
         geometry.setAttribute('color', new BufferAttribute(cloud.colours, 3, true));
         geometry.setAttribute('confidence', new BufferAttribute(cloud.confidences, 1));
         this.points = new Points(geometry, this.material);
-        // The camera moves inside the cloud: no sphere around it is worth a test.
+        // The camera moves inside the cloud, so culling it as a whole is pointless.
         this.points.frustumCulled = false;
-        // From x right, y down, z forward to y up and z towards the viewer.
+        // Converts x right, y down, z forward to y up and z towards the viewer.
         this.points.rotation.x = Math.PI;
         this.scene.add(this.points);
         this.rig = { cameras, width, height };
@@ -99,7 +99,7 @@ export class CloudView {
         }
     }
 
-    /** Turns the points to both sides, slowly, so that their depth is seen; until somebody takes hold of them, or looks at something else. */
+    /** Swings the points slowly from side to side to show their depth, until the user moves them or switches to another view. */
     private swing(begun: number): void {
         const points = this.points;
         const start = new Spherical().setFromVector3(this.camera.position.clone().sub(this.controls.target));
@@ -124,19 +124,19 @@ export class CloudView {
         requestAnimationFrame(frame);
     }
 
-    /** Lets the points stand still from now on. */
+    /** Stops the swinging for good. */
     private hold(): void {
         this.swings = false;
     }
 
-    /** Looks at the target from there. */
+    /** Looks at the target from this position. */
     private look(from: Spherical): void {
         this.camera.position.setFromSpherical(from).add(this.controls.target);
         this.controls.update();
         this.ask();
     }
 
-    /** Gives the memory of the points back. */
+    /** Frees the memory of the points. */
     clear(): void {
         if (this.points) {
             this.scene.remove(this.points);
@@ -147,19 +147,19 @@ export class CloudView {
         }
     }
 
-    /** Hides the points of less confidence. */
+    /** Hides points below this confidence. */
     atLeast(confidence: number): void {
         this.uniform('least', confidence);
         this.ask();
     }
 
-    /** The first view again, at rest. */
+    /** Restores the first view, without swinging. */
     rest(): void {
         this.hold();
         this.reset();
     }
 
-    /** The view of the left camera, a little from the side. */
+    /** The view of the left camera, slightly from the side. */
     private reset(): void {
         if (!this.points || !this.rig) {
             return;
@@ -191,7 +191,7 @@ export class CloudView {
         this.renderer.setSize(clientWidth, clientHeight, false);
         this.camera.aspect = clientWidth / clientHeight;
         if (this.rig) {
-            // All that the left camera sees fits in, with a margin for the turned view.
+            // Fits the field of view of the left camera, with a margin for the rotated view.
             const { cameras, width, height } = this.rig;
             const half = (1.12 * Math.max(height, width / this.camera.aspect)) / 2 / cameras.focalLength;
             this.camera.fov = (360 / Math.PI) * Math.atan(half);
@@ -201,7 +201,7 @@ export class CloudView {
         this.ask();
     }
 
-    /** Draws once before the next frame, however often it is asked. */
+    /** Requests one redraw in the next frame, however often it is called. */
     private ask(): void {
         this.due ||= requestAnimationFrame(() => {
             this.due = 0;
@@ -216,7 +216,7 @@ export class CloudView {
         const offset = this.camera.position.clone().sub(target);
         const keys = step(event);
         if (keys && event.shiftKey) {
-            // Along the screen, by a part of the distance.
+            // Moves in the screen plane, in proportion to the distance.
             const move = new Vector3(Math.sign(keys[0]), -Math.sign(keys[1]), 0).multiplyScalar(0.04 * offset.length());
             target.add(move.applyQuaternion(this.camera.quaternion));
         } else if (keys) {
@@ -240,7 +240,7 @@ export class CloudView {
     }
 }
 
-/** The depths below which 5, 50 and 95 percent of the points lie. */
+/** The 5th, 50th and 95th percentile of the depths. */
 function depths(positions: BufferAttribute): [number, number, number] {
     const every = Math.max(1, Math.floor(positions.count / 10_000));
     const some: number[] = [];

@@ -1,17 +1,17 @@
-// Images that the engine does not read and the browser does, and images that hold both views.
+// Decoding by the browser of formats that the engine does not read, and splitting of images that hold both views.
 
 import { inOrder } from './order';
 
-/** A way to cut an image into two views. */
+/** How to split an image into two views. */
 export type Cut = 'beside' | 'above';
 
-/** The longer side of the small pictures of the halves that are compared. */
+/** Longer side of the thumbnails of the halves to compare. */
 const SMALL = 48;
 
-/** From this correlation on, the halves of an image of a fitting shape count as two views of one scene. */
+/** Correlation from which the halves of an image of a plausible shape count as two views. */
 const ALIKE = 0.6;
 
-/** From this correlation on, an upper and a lower half count as two views in any shape. Those of 50 single photographs reach 0.84. */
+/** Correlation from which an upper and a lower half count as two views in any shape. Those of 50 single photographs reach 0.84. */
 const SURE = 0.9;
 
 function canvas(width: number, height: number): { canvas: OffscreenCanvas; context: OffscreenCanvasRenderingContext2D } {
@@ -23,7 +23,7 @@ function canvas(width: number, height: number): { canvas: OffscreenCanvas; conte
     return { canvas, context };
 }
 
-/** The file as PNG, upright, by the browser; undefined where it cannot read it either. */
+/** Converts a file to upright PNG with the browser; undefined if the browser cannot read it either. */
 export async function decoded(file: Blob): Promise<Blob | undefined> {
     const bitmap = await createImageBitmap(file, { imageOrientation: 'from-image' }).catch(() => undefined);
     return bitmap && part(bitmap, 0, 0, bitmap.width, bitmap.height).finally(() => bitmap.close());
@@ -35,7 +35,7 @@ function part(image: ImageBitmap, x: number, y: number, width: number, height: n
     return of.canvas.convertToBlob({ type: 'image/png' });
 }
 
-/** Both views of one image: the left one is on the left, or above. */
+/** Splits an image into both views: the left one is on the left or on top. */
 export async function cut(file: Blob, how: Cut): Promise<[Blob, Blob]> {
     const image = await createImageBitmap(file);
     try {
@@ -44,14 +44,14 @@ export async function cut(file: Blob, how: Cut): Promise<[Blob, Blob]> {
         if (w < 1 || h < 1) {
             throw new Error('The image is too small to hold two views.');
         }
-        // A column or row in the middle of an odd number belongs to neither.
+        // The middle column or row of an odd number belongs to neither view.
         return await Promise.all([part(image, 0, 0, w, h), part(image, width - w, height - h, w, h)]);
     } finally {
         image.close();
     }
 }
 
-/** How an image is cut that probably holds both views; undefined for one view. */
+/** Guesses how to split an image that probably holds both views; undefined for a single view. */
 export async function guess(file: Blob): Promise<Cut | undefined> {
     const image = await createImageBitmap(file).catch(() => undefined);
     if (!image) {
@@ -71,14 +71,14 @@ export async function guess(file: Blob): Promise<Cut | undefined> {
     const beside = correlation(grey(0, 0, width / 2, height), grey(width / 2, 0, width / 2, height));
     const above = correlation(grey(0, 0, width, height / 2), grey(0, height / 2, width, height / 2));
     image.close();
-    // Most single photographs are 4 : 3 to 16 : 9, and most of both views are wider than that or higher than wide.
+    // Most single photographs are 4 : 3 to 16 : 9; most stereo images are wider than that, or portrait.
     if (beside > ALIKE && beside > above && width > 1.9 * height) {
         return 'beside';
     }
     return above > beside && (above > SURE || (above > ALIKE && height > 1.05 * width)) ? 'above' : undefined;
 }
 
-/** The best correlation of two small pictures, of which the second may be moved along its rows. */
+/** The best correlation of two thumbnails over horizontal shifts of the second. */
 function correlation(left: number[][], right: number[][]): number {
     const width = left[0]?.length ?? 0;
     const reach = Math.floor(width / 6);
@@ -99,7 +99,7 @@ function correlation(left: number[][], right: number[][]): number {
     return Math.max(...Array.from({ length: 2 * reach + 1 }, (_, i) => moved(i - reach)));
 }
 
-/** What a folder of a benchmark calls its views, left and right. */
+/** File names of left and right views in benchmarks. */
 const LAYOUTS = [
     ['im0', 'im1'],
     ['view1', 'view5'],
@@ -108,7 +108,7 @@ const LAYOUTS = [
 
 const stem = (name: string) => name.replace(/^.*[\\/]/, '').replace(/\.[^.]*$/, '').toLowerCase();
 
-/** The two views among some images, the left one first; all where nothing tells. */
+/** Selects the two views among some images, left one first; returns all of them if the names do not tell. */
 export function views<T extends { name: string }>(images: T[]): T[] {
     if (images.length > 2) {
         for (const layout of LAYOUTS) {

@@ -1,13 +1,13 @@
-// Elements of the page and a few words for people.
+// Elements of the page and formatting of values.
 
 import type { Picture } from './protocol';
 
-/** The element with this id, which index.html has. */
+/** The element with this id in index.html. */
 export function by<T extends HTMLElement = HTMLElement>(id: string): T {
     return document.getElementById(id) as T;
 }
 
-/** A new element. */
+/** Creates an element. */
 export function make<K extends keyof HTMLElementTagNameMap>(
     tag: K,
     properties: Partial<HTMLElementTagNameMap[K]> = {},
@@ -18,7 +18,7 @@ export function make<K extends keyof HTMLElementTagNameMap>(
     return element;
 }
 
-/** Shows a text where there is one; a live region is read out when its text changes. */
+/** Sets or clears a text. Live regions are announced only when their text changes. */
 export function say(id: string, text: string | undefined): void {
     const all = by(id);
     // A note has a button beside its text.
@@ -31,7 +31,7 @@ export function say(id: string, text: string | undefined): void {
     }
 }
 
-/** A copy of a picture on a canvas, in its own size. */
+/** Draws a picture on a canvas at its own size. */
 export function draw(canvas: HTMLCanvasElement, { width, height, pixels }: Picture): void {
     [canvas.width, canvas.height] = [width, height];
     const context = canvas.getContext('2d');
@@ -43,7 +43,7 @@ export function draw(canvas: HTMLCanvasElement, { width, height, pixels }: Pictu
 
 export const words = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
-/** A text that begins with a capital. */
+/** Capitalizes the first letter. */
 export const sentence = (text: string): string => text.charAt(0).toUpperCase() + text.slice(1);
 
 const whole = new Intl.NumberFormat('en');
@@ -65,7 +65,7 @@ export function duration(milliseconds: number): string {
     return `${seconds.toFixed(seconds < 1 ? 2 : seconds < 10 ? 1 : 0)} s`;
 }
 
-/** The nearest of a pixel's neighbours in steps, for arrow keys; undefined for other keys. */
+/** The pixel offset for an arrow key; undefined for other keys. */
 export function step(event: KeyboardEvent): [number, number] | undefined {
     const length = event.shiftKey ? 10 : 1;
     const steps: Record<string, [number, number]> = {

@@ -1,16 +1,16 @@
-// What is dropped on the page: files, and the files of folders.
+// Files and folders dropped on the page.
 
 export interface Named {
     file: Blob;
     name: string;
 }
 
-/** What a folder holds besides its files: notes that systems leave there. */
+/** Files that operating systems create in folders. */
 const HIDDEN = /^(\.|desktop\.ini$|thumbs\.db$)/i;
 
-/** The files of a drop, and the name of the folder that they are from, where it is one. */
+/** The dropped files, and the name of their folder if there is one. */
 export async function dropped(transfer: DataTransfer): Promise<{ files: Named[]; folder: string | undefined }> {
-    // To be asked for before anything is awaited: the lists are empty afterwards.
+    // Must be read before the first await, as the lists are cleared afterwards.
     const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter((entry) => entry !== null && entry !== undefined);
     const plain = [...transfer.files];
     if (!entries.some((entry) => entry.isDirectory)) {
@@ -27,7 +27,7 @@ const opened = (entries: FileSystemEntry[]): Promise<File[]> =>
 
 const { compare } = new Intl.Collator('en', { numeric: true });
 
-/** The files of a folder, by their names; a reader gives some at a time, in any order. */
+/** The files of a folder, sorted by name; the reader returns them in batches in any order. */
 async function listed(folder: FileSystemDirectoryEntry): Promise<File[]> {
     const reader = folder.createReader();
     const all: FileSystemEntry[] = [];

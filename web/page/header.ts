@@ -1,15 +1,15 @@
-// What the first bytes of an image file say of it, so that a slot can refuse a file before the engine decodes it.
+// Parses the first bytes of an image file, so that a slot can refuse it before the engine decodes it.
 
 export interface Header {
     format: 'PNG' | 'JPEG' | 'PNM' | 'PFM' | 'TIFF';
-    /** Where the first bytes tell it. */
+    /** Undefined if it is not in the first bytes. */
     size: { width: number; height: number } | undefined;
 }
 
-/** How far into a JPEG file its size is looked for, behind what a camera tells of itself. */
+/** How far to search for the size in a JPEG file, after the metadata of the camera. */
 const REACH = 1 << 20;
 
-/** What kind of image a file is; undefined where it is none that the engine reads. */
+/** The format of an image file; undefined if the engine does not read it. */
 export async function header(file: Blob): Promise<Header | undefined> {
     const view = new DataView(await file.slice(0, REACH).arrayBuffer());
     const starts = (...bytes: number[]) =>
@@ -45,7 +45,7 @@ function jpeg(view: DataView): Header['size'] {
     let at = 2;
     while (at + 9 < view.byteLength && view.getUint8(at) === 0xff) {
         const marker = view.getUint8(at + 1);
-        // Frames are C0 to CF, but for three tables among them.
+        // Frame headers are C0 to CF, except for three of them.
         if (marker >= 0xc0 && marker <= 0xcf && ![0xc4, 0xc8, 0xcc].includes(marker)) {
             return { width: view.getUint16(at + 7), height: view.getUint16(at + 5) };
         }
@@ -54,7 +54,7 @@ function jpeg(view: DataView): Header['size'] {
     return undefined;
 }
 
-/** The size in the first directory, which may lie behind the pixels. */
+/** The size in the first directory, which may follow the pixels. */
 async function tiff(file: Blob, start: DataView): Promise<Header['size']> {
     const little = start.getUint8(0) === 0x49;
     if (start.byteLength < 8) {

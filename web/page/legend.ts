@@ -1,9 +1,9 @@
-// What the colours of a view mean.
+// The legend of a view.
 
 import { by, make } from './dom';
 import type { Reason } from './protocol';
 
-/** A scale below the picture, from its least to its largest value. */
+/** The colour scale below the picture, from the least to the largest value. */
 export function scale(colours: Uint8Array, min: string, max: string, unit: string, about = ''): void {
     const canvas = by('scale').querySelector('canvas') as HTMLCanvasElement;
     const pixels = new ImageData(256, 1);
@@ -19,12 +19,12 @@ export function scale(colours: Uint8Array, min: string, max: string, unit: strin
     by('legend').hidden = true;
 }
 
-/** The words for a pixel of the validity map. */
+/** The reasons of a pixel of the validity map. */
 export function named(reasons: Reason[], validity: number): Reason[] {
     return reasons.filter(({ bit }) => (bit === 0 ? validity === 0 : (validity & bit) !== 0));
 }
 
-/** The reasons with their colours and how many of the pixels have them; a pixel may have several. */
+/** Lists the reasons with their colours and shares of pixels; a pixel may have several. */
 export function reasons(all: Reason[], validity: Uint8Array): void {
     const pixels = new Uint32Array(256);
     for (const value of validity) {

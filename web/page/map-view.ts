@@ -1,4 +1,4 @@
-// A picture with the left image behind a divider, at any zoom, and the pixel that is pointed at.
+// A zoomable picture with the left image behind a divider, and the selected pixel.
 
 import { by, draw, step } from './dom';
 import type { Picture } from './protocol';
@@ -20,7 +20,7 @@ export class MapView {
     private zoom: number | undefined;
     private marked: Pixel | undefined;
 
-    /** `pointed` is called with the pixel under the pointer, with undefined when there is none, and `picked` with one that is clicked. */
+    /** `pointed` is called with the pixel under the pointer or undefined, and `picked` with a clicked pixel. */
     constructor(
         private readonly pointed: (pixel: Pixel | undefined) => void,
         private readonly picked: (pixel: Pixel) => void,
@@ -32,12 +32,12 @@ export class MapView {
         this.listenToPinch();
     }
 
-    /** Draws another picture in the place of the one that is shown, of the same size. */
+    /** Replaces the picture by another of the same size. */
     redraw(view: Picture): void {
         draw(by<HTMLCanvasElement>('view'), view);
     }
 
-    /** Shows a picture, and another one of its size behind the divider; one of another size is fitted anew. */
+    /** Shows a picture and another of its size behind the divider; a new size resets the zoom. */
     show(view: Picture, behind: Picture): void {
         draw(by<HTMLCanvasElement>('view'), view);
         draw(by<HTMLCanvasElement>('under'), behind);
@@ -63,7 +63,7 @@ export class MapView {
     }
 
     private get fit(): number {
-        // To a fraction of a pixel; without scroll bars, since what fits has none.
+        // Uses fractional sizes, and ignores scroll bars, as a fitted picture has none.
         const { width, height } = this.box.getBoundingClientRect();
         return Math.min(width / this.size.width, height / this.size.height);
     }
@@ -78,7 +78,7 @@ export class MapView {
             return;
         }
         const scale = this.scale;
-        // Rounded down, so that what fits needs no scroll bars.
+        // Rounded down, so that a fitted picture needs no scroll bars.
         this.sheet.style.width = `${Math.floor(width * scale)}px`;
         this.sheet.style.height = `${Math.floor(height * scale)}px`;
         this.sheet.classList.toggle('pixels', scale > 1);
@@ -89,7 +89,7 @@ export class MapView {
         this.place();
     }
 
-    /** Zooms and keeps the point of the picture that is at this place of the window. */
+    /** Zooms around this point of the window. */
     private zoomTo(zoom: number | undefined, at?: { clientX: number; clientY: number }): void {
         const box = this.box.getBoundingClientRect();
         const { clientX, clientY } = at ?? { clientX: box.x + box.width / 2, clientY: box.y + box.height / 2 };
@@ -152,7 +152,7 @@ export class MapView {
         });
     }
 
-    /** The point that arrow keys move. */
+    /** Marks the pixel that arrow keys move. */
     private mark(pixel: Pixel | undefined): void {
         this.marked = pixel;
         this.probe.hidden = !pixel;
@@ -187,14 +187,14 @@ export class MapView {
         let pressed = { x: 0, y: 0 };
         this.box.addEventListener('click', (event) => {
             const at = pixel(event);
-            // Not where the picture was dragged.
+            // Ignores clicks that end a drag.
             if (at && Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) < 4) {
                 this.picked(at);
             }
         });
         this.box.addEventListener('pointerdown', (event) => {
             pressed = { x: event.clientX, y: event.clientY };
-            // A finger scrolls by itself.
+            // Touch scrolls natively.
             if (event.button === 0 && event.pointerType === 'mouse' && this.zoom !== undefined) {
                 this.box.setPointerCapture(event.pointerId);
             }
@@ -202,7 +202,7 @@ export class MapView {
         });
     }
 
-    /** Two fingers zoom the picture, and not the page. */
+    /** Pinching zooms the picture instead of the page. */
     private listenToPinch(): void {
         let start: { apart: number; zoom: number } | undefined;
         const fingers = ({ touches }: TouchEvent) => {

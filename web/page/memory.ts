@@ -1,14 +1,14 @@
-// Whether a pair fits into what WebAssembly can address, before anything is read.
+// Checks that a pair fits into the memory of WebAssembly before it is read.
 
 import { count, size } from './dom';
 
-/** All that a WebAssembly module of 32 bits can hold. */
+/** The address space of 32-bit WebAssembly. */
 const LIMIT = 2 ** 32;
 
-/** Bytes that a match takes per pixel at least: both views decoded, the maps, and their copies for the page. */
+/** Least bytes per pixel of a match: both decoded views, the maps, and the page's copies. */
 const PER_PIXEL = 64;
 
-/** Why a pair of this size is too large; undefined where it may fit. */
+/** Why a pair of this size is too large; undefined if it may fit. */
 export function tooLarge(width: number, height: number, files: number): string | undefined {
     const least = width * height * PER_PIXEL + files;
     return least > LIMIT

@@ -1,35 +1,35 @@
-// The surface of a map as triangles, for other programs. A chunk of its own, loaded when it is saved.
+// Exports the surface of a map as triangles. A separate chunk, loaded on first use.
 
 import type { Cameras, Picture } from './protocol';
 import { place } from './ruler';
 
 export interface Mesh {
-    /** x to the right, y down, z forward of the left camera, in the unit of the baseline. */
+    /** x right, y down, z forward of the left camera, in the unit of the baseline. */
     positions: Float32Array<ArrayBuffer>;
-    /** Where each vertex is in the left view, from 0 to 1. */
+    /** Texture coordinates in the left view, 0 to 1. */
     texture: Float32Array<ArrayBuffer>;
     colours: Uint8Array<ArrayBuffer>;
-    /** Three vertices each, counter-clockwise as the camera sees them. */
+    /** Three vertices each, counter-clockwise as seen by the camera. */
     triangles: Uint32Array<ArrayBuffer>;
     unit: string;
 }
 
-/** What a mesh is made of. */
+/** The inputs of a mesh. */
 export interface Surface {
     width: number;
     height: number;
     disparity: Float32Array;
     confidence: Uint8Array;
-    /** 0 where a disparity is measured and trusted. */
+    /** 0 where a disparity was measured and is reliable. */
     validity: Uint8Array;
 }
 
-/** Vertices beyond which neighbours are left out. */
+/** Largest number of vertices; larger maps are subsampled. */
 const MOST = 1_000_000;
 
 /**
- * The pixels that are measured and trusted with at least this confidence, joined where neighbours differ by at most a pixel for each
- * pixel that they are apart: surfaces stay whole, and edges are open.
+ * A mesh of the measured pixels of at least this confidence. Neighbours are connected if their disparities differ by at most a pixel per
+ * pixel of distance, so that surfaces are closed and depth edges open.
  */
 export function mesh({ width, height, disparity, confidence, validity }: Surface, cameras: Cameras, left: Picture, least: number): Mesh {
     const step = Math.ceil(Math.sqrt((width * height) / MOST));
@@ -67,7 +67,7 @@ export function mesh({ width, height, disparity, confidence, validity }: Surface
         for (let column = 0; column + 1 < columns; column += 1) {
             const a = row * columns + column;
             const [b, c, d] = [a + 1, a + columns, a + columns + 1];
-            // Along the diagonal that is the flatter one.
+            // Splits along the flatter diagonal.
             if (Math.abs(of(a) - of(d)) <= Math.abs(of(b) - of(c))) {
                 join(a, c, d);
                 join(a, d, b);
@@ -86,10 +86,10 @@ export function mesh({ width, height, disparity, confidence, validity }: Surface
     };
 }
 
-/** Metres in a unit; glTF has no other. */
+/** Metres per unit, as glTF uses metres. */
 const METRES: Record<string, number> = { mm: 1e-3, cm: 1e-2, m: 1 };
 
-/** The mesh with the left view (PNG) on it, as a binary file of glTF 2.0: y up, z towards the viewer. */
+/** The mesh textured with the left view (PNG), as binary glTF 2.0: y up, z towards the viewer. */
 export function glb({ positions, texture, triangles, unit }: Mesh, image: Uint8Array): Uint8Array<ArrayBuffer> {
     const scale = METRES[unit] ?? 1;
     const turned = positions.map((value, i) => (i % 3 === 0 ? scale * value : -scale * value));
@@ -133,7 +133,7 @@ export function glb({ positions, texture, triangles, unit }: Mesh, image: Uint8A
     return file;
 }
 
-/** The mesh with a colour for each vertex, as a binary file of PLY. */
+/** The mesh with vertex colours, as binary PLY. */
 export function ply({ positions, colours, triangles }: Mesh): Uint8Array<ArrayBuffer> {
     const [vertices, faces] = [positions.length / 3, triangles.length / 3];
     const header = new TextEncoder().encode(

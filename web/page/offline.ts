@@ -1,4 +1,4 @@
-// Keeps the page for use without a network, and tells of a newer one.
+// Caches the page for offline use, and offers new versions.
 
 import { by } from './dom';
 
@@ -15,11 +15,11 @@ export async function keepOffline(): Promise<void> {
         await navigator.serviceWorker.ready;
         document.documentElement.dataset['offline'] = 'ready';
     } catch {
-        // Some private windows have none; the page works without.
+        // Some private windows have no service workers; the page works without.
     }
 }
 
-/** Tells of a new version once it is there, and takes it when asked. */
+/** Offers a new version once it is installed, and switches to it on request. */
 function tell(kept: ServiceWorkerRegistration): void {
     const show = (next: ServiceWorker | null) => {
         if (!next) {

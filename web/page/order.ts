@@ -1,16 +1,16 @@
-// Which of two files is the left view, by their names.
+// Tells left from right views by their file names.
 
-/** The parts of a name that tell views apart: words and numbers, without the folder and the extension. */
+/** The words and numbers in a name, without folder and extension. */
 function parts(name: string): string[] {
     const stem = name.replace(/^.*[\\/]/, '').replace(/\.[^.]*$/, '');
-    // Words end where digits or capitals begin: imgL, leftImage, view5.
+    // Words end at digits and capitals: imgL, leftImage, view5.
     return (stem.match(/\d+|[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[A-Z]/g) ?? []).map((part) => part.toLowerCase());
 }
 
-/** -1 for a word that names the left view, 1 for one that names the right view. */
+/** -1 for a word that names the left view, 1 for the right view, 0 otherwise. */
 const side = (part: string): number => (['left', 'l'].includes(part) ? -1 : ['right', 'r'].includes(part) ? 1 : 0);
 
-/** Which of two numbers is the smaller one, of any length; none comes before any. 0 for words. */
+/** Compares two numbers of any length; a missing number is the smallest. 0 for words. */
 function lower(one: string, other: string): number {
     if (!/^\d*$/.test(one) || !/^\d*$/.test(other)) {
         return 0;
@@ -19,11 +19,11 @@ function lower(one: string, other: string): number {
     return a < b ? -1 : a > b ? 1 : 0;
 }
 
-/** Below 0 where `a` is the left view of the two, above 0 where `b` is, and 0 where the names do not tell. */
+/** Below 0 if `a` is the left view, above 0 if `b` is, 0 if the names do not tell. */
 function compared(a: string, b: string): number {
     const [first, second] = [parts(a), parts(b)];
     const both = Array.from({ length: Math.max(first.length, second.length) }, (_, i) => [first[i] ?? '', second[i] ?? ''] as const);
-    // Words tell more than numbers: the right view may have been taken first.
+    // Words take precedence over numbers, as the right view may have been taken first.
     const words = both.map(([one, other]) => side(one) - side(other));
     return [...words, ...both.map(([one, other]) => lower(one, other))].find((order) => order !== 0) ?? 0;
 }

@@ -1,4 +1,4 @@
-// The page: what follows what.
+// The page: connects its parts.
 
 import { followed } from './bar';
 import { Broken, Client, Interrupted, explained } from './client';
@@ -25,14 +25,14 @@ import { Turns } from './turns';
 import { calm, onlyLooks } from './visitor';
 import { withoutWebGpu } from './webgpu';
 
-/** Filled in by the build: the worker beside this file, and the scenes. */
+/** Inserted by the build: the worker beside this file, and the scenes. */
 declare const WORKER: string;
 declare const SCENES: Scene[];
 
-/** How the first scene is matched: at once, on any machine. */
+/** Settings of the first match: fast on any machine. */
 const FIRST = { device: 'cpu', preset: 'fast' } as const;
 
-/** How long the first map is on screen before its points are, in milliseconds. */
+/** How long the first map is shown before its points, in ms. */
 const LOOK = 1500;
 
 type View = Map | 'left' | 'stereo' | 'points';
@@ -40,22 +40,22 @@ type View = Map | 'left' | 'stereo' | 'points';
 /** What a pair is rectified by. */
 type Rectifier = 'calibration' | 'matches';
 
-/** A pair as the engine has read it, and rectified it where that was wanted. */
+/** A pair as read by the engine, and rectified if requested. */
 interface Read extends Pair {
     by: Rectifier | undefined;
-    /** How it was rectified. */
+    /** Notes about the rectification. */
     notes: string[];
-    /** That of the files, before it is rectified. */
+    /** Size of the files, before rectification. */
     size: { width: number; height: number };
-    /** What a calibration tells, and the names of its files. */
+    /** Contents of the calibration, and the names of its files. */
     cameras: Cameras | undefined;
     range: Range | undefined;
     files: string;
-    /** The worker that holds it. */
+    /** Generation of the worker that holds the pair. */
     generation: number;
 }
 
-/** What the page is at; tests wait for it too. */
+/** State of the page; tests wait for it. */
 type State = 'starting' | 'empty' | 'loading' | 'ready' | 'matching' | 'comparing' | 'done' | 'failed';
 
 const app = by('app');
@@ -99,25 +99,25 @@ const remarks = new Remarks({
 const list = tabs(by('tabs'), (tab) => select(tab.dataset['view'] as View));
 
 let facts: Facts | undefined;
-/** Undefined until it was looked for. */
+/** Undefined until checked. */
 let gpu: boolean | undefined;
 let view: View = 'disparity';
-/** What files of it are called begins with `name`. */
+/** `name` is the prefix of saved files. */
 let pair: (Read & { name: string }) | undefined;
-/** What the user wants to rectify by, or not to; undefined leaves it to the calibration. `failed` where its matches do not rectify it. */
+/** The user's choice of rectification; undefined leaves it to the calibration. `failed` if rectification by matches failed. */
 let rectify: Rectifier | 'nothing' | 'failed' | undefined;
-/** What is probably wrong with the pair and the range, before a match. */
+/** Likely problems of the pair and the range before a match. */
 let suspicions: Warning[] = [];
-/** The range that `automatic` stands for, and where it comes from. */
+/** The range used by `automatic`, and its source. */
 let found: { range: Range; by: string } | undefined;
 let result: (Result & { generation: number; pictures: Partial<Record<Map, Picture>>; on: Device; preset: string; suspicions: Warning[] }) | undefined;
-/** The map before this one, of the same pair. */
+/** The previous map of the same pair. */
 let before: { disparity: Float32Array; preset: string } | undefined;
-/** The pair, and all that is done with it. */
+/** The pair and everything that depends on it. */
 const turns = new Turns();
 /** A check of the range. */
 const checks = new Turns();
-/** What the user can stop. */
+/** A match that the user can stop. */
 const stops = new Turns();
 
 function be(state: State): void {
@@ -146,7 +146,7 @@ async function start(): Promise<void> {
         be('failed');
         return;
     }
-    // The first view is a result, unless somebody was faster.
+    // The first view is a result, unless the user was faster.
     const linked = new URLSearchParams(location.hash.slice(1));
     const first = SCENES.find(({ name }) => name === linked.get('scene')) ?? SCENES[0];
     settings.take(linked);
@@ -169,7 +169,7 @@ async function start(): Promise<void> {
     await showDepth();
 }
 
-/** The name of the GPU; undefined where there is none. A worker that takes the place of one that was ended meanwhile is asked again. */
+/** The name of the GPU; undefined if there is none. Retries if the worker was replaced in the meantime. */
 async function openGpu(): Promise<string | undefined> {
     for (;;) {
         try {
@@ -182,7 +182,7 @@ async function openGpu(): Promise<string | undefined> {
     }
 }
 
-/** To somebody who has only looked so far, the first result also shows its depth. */
+/** Shows the points of the first result to a user who has not interacted yet. */
 async function showDepth(): Promise<void> {
     await new Promise((resolve) => setTimeout(resolve, LOOK));
     if (onlyLooks() && result && (await points.prepare()) && onlyLooks() && result) {
@@ -190,7 +190,7 @@ async function showDepth(): Promise<void> {
     }
 }
 
-/** Ends when the pair that the slots hold is read, and matched where that was asked for. */
+/** Resolves when the current pair is read, and matched if requested. */
 let busy: Promise<void> = Promise.resolve();
 
 function load(match = false): Promise<void> {
@@ -198,7 +198,7 @@ function load(match = false): Promise<void> {
     return busy;
 }
 
-/** Reads the pair that the slots hold, as far as they do. */
+/** Reads the pair in the slots, if it is complete. */
 async function read(matched: boolean): Promise<void> {
     const signal = turns.next();
     app.dataset['turn'] = String(Number(app.dataset['turn'] ?? 0) + 1);
@@ -238,7 +238,7 @@ async function read(matched: boolean): Promise<void> {
     }
 }
 
-/** Refuses views that make no pair, or one that is too large, before they are read. */
+/** Throws if the views do not form a pair, or are too large, before they are read. */
 function mustFit(left: Opened, right: Opened): void {
     const [a, b] = [left.header.size, right.header.size];
     const huge = a && tooLarge(a.width, a.height, left.file.size + right.file.size);
@@ -251,7 +251,7 @@ function mustFit(left: Opened, right: Opened): void {
     }
 }
 
-/** Says what is wrong with a pair, at the slot of the view that it is about. */
+/** Reports a problem with a pair, at the slot of the view concerned. */
 function refuse(error: unknown, left: string, right: string): void {
     const text = explained(error);
     const about = (name: string) => text.includes(name);
@@ -262,7 +262,7 @@ function refuse(error: unknown, left: string, right: string): void {
     }
 }
 
-/** Has the engine read the pair, and rectify it where that is wanted. */
+/** Reads the pair with the engine, and rectifies it if requested. */
 async function open(signal: AbortSignal, left: Opened, right: Opened): Promise<Read> {
     const call = client.within(signal);
     const { generation } = client;
@@ -271,7 +271,7 @@ async function open(signal: AbortSignal, left: Opened, right: Opened): Promise<R
     const { calibration } = slots;
     const files = calibration.map(({ name }) => name).join(', ');
     const problems: string[] = [];
-    // What cannot be used is told, and the pair is taken without it.
+    // A calibration that cannot be used is reported, and the pair is read without it.
     const tried = async <T>(act: () => Promise<T>): Promise<T | undefined> => {
         try {
             return await act();
@@ -306,13 +306,13 @@ async function open(signal: AbortSignal, left: Opened, right: Opened): Promise<R
         : { ...raw, ...read, by: undefined, notes: known?.notes ?? [], cameras: known?.cameras, range: known?.range };
 }
 
-/** Does another thing about the rectification of the pair, and matches it. */
+/** Changes the rectification of the pair, and matches it. */
 function rectifyBy(by: Rectifier | 'nothing'): void {
     rectify = by;
     void load(true);
 }
 
-/** Finds the range that `automatic` stands for. */
+/** Determines the range for `automatic`. */
 async function findRange(signal: AbortSignal): Promise<void> {
     if (pair?.range) {
         found = { range: pair.range, by: pair.files };
@@ -328,12 +328,12 @@ async function findRange(signal: AbortSignal): Promise<void> {
     signal.throwIfAborted();
 }
 
-/** The range to search, which is said beside its choice. */
+/** The range to search. */
 function range(): Range | undefined {
     return settings.automatic ? found?.range : settings.given;
 }
 
-/** Says which range it will be, and what is probably wrong with it. */
+/** Shows the range to be searched, and its likely problems. */
 async function checkRange(): Promise<void> {
     const wanted = range();
     const { automatic } = settings;
@@ -346,12 +346,12 @@ async function checkRange(): Promise<void> {
         return;
     }
     say('range-problem', unfound ? 'Sparse matches find no range. Give one.' : undefined);
-    // A new worker holds no pair before the next match.
+    // A new worker has no pair before the next match.
     if (!pair || pair.generation !== client.generation) {
         return;
     }
     try {
-        // A range that sparse matches found does not show what the user knows.
+        // Only a range from the user is informative.
         suspicions = await client.within(signal)('warnings', automatic && found?.by === MATCHES ? undefined : wanted);
     } catch (error) {
         if (signal.aborted) {
@@ -360,24 +360,24 @@ async function checkRange(): Promise<void> {
         suspicions = [];
         say('range-problem', words(error));
     }
-    // What is said of a result stays with it.
+    // The warnings of a result remain with it.
     if (!result) {
         warn(suspicions);
     }
 }
 
-/** Says what is probably wrong. What did not help is not offered again. */
+/** Shows warnings. A remedy that has failed is not offered again. */
 function warn(warnings: Warning[]): void {
     remarks.warn(warnings.map((warning) => (rectify === 'failed' && warning.remedy === 'rectify' ? { ...warning, remedy: undefined } : warning)));
 }
 
-/** Where a range comes from that no file gives. */
+/** Source of a range that no file gives. */
 const MATCHES = 'sparse matches';
 
-/** Ends when no match runs. */
+/** Resolves when no match is running. */
 let running: Promise<void> | undefined;
 
-/** Runs what matches, alone: what runs before it ends. */
+/** Runs a match exclusively, after ending the previous one. */
 async function alone(signal: AbortSignal, act: () => Promise<void>): Promise<void> {
     while (running) {
         void client.cancel();
@@ -389,11 +389,11 @@ async function alone(signal: AbortSignal, act: () => Promise<void>): Promise<voi
     }
 }
 
-/** Runs a match with its bar; undefined when it was stopped or failed, which is said. */
+/** Runs a match with its progress bar; undefined if it was stopped or failed, which is reported. */
 async function run<T>(signal: AbortSignal, state: State, match: () => Promise<T>): Promise<T | undefined> {
     say('problem', undefined);
     client.onProgress = followed();
-    // The button that was pressed gives way to another one. A match that nobody has pressed takes no focus.
+    // Focus moves to the button that replaces the pressed one, but only if the user pressed it.
     const pressed = document.activeElement === by(state === 'comparing' ? 'compare' : 'match');
     be(state);
     if (pressed) {
@@ -417,7 +417,7 @@ async function run<T>(signal: AbortSignal, state: State, match: () => Promise<T>
     }
 }
 
-/** The worker's pair, read again where the worker is a new one. */
+/** Reads the pair again if the worker was replaced. */
 async function ensurePair(signal: AbortSignal): Promise<void> {
     const { left, right } = slots.views;
     if (pair && left && right && pair.generation !== client.generation) {
@@ -437,7 +437,7 @@ async function match({ device, preset, size }: { device: Device; preset: string;
         return;
     }
     if (!pair) {
-        // It could not be read; perhaps it can be now.
+        // An earlier attempt to read it failed; retries.
         void load(true);
         return;
     }
@@ -477,7 +477,7 @@ async function match({ device, preset, size }: { device: Device; preset: string;
     });
 }
 
-/** The address holds the scene and the settings, so that it can be passed on. */
+/** Puts scene and settings into the URL, so that it can be shared. */
 function address(): void {
     const { chosen, automatic, given } = settings;
     const parts = { ...(slots.scene && { scene: slots.scene }), ...(chosen && { preset: chosen }), ...(!automatic && given && { range: `${given.min},${given.max}` }) };
@@ -510,7 +510,7 @@ async function present(): Promise<void> {
     await showView();
 }
 
-/** The map before can stand behind the divider. */
+/** Offers the previous map behind the divider. */
 function offerBefore(): void {
     const behind = by<HTMLSelectElement>('behind');
     const option = behind.querySelector('[value="before"]') as HTMLOptionElement;
@@ -521,7 +521,7 @@ function offerBefore(): void {
     }
 }
 
-/** What is left of the divider. */
+/** The picture to the left of the divider. */
 function behind(left: Picture): Picture {
     if (!before || !result || !facts || by<HTMLSelectElement>('behind').value === 'left') {
         return left;
@@ -529,7 +529,7 @@ function behind(left: Picture): Picture {
     return painted(result.width, result.height, before.disparity, facts.scales[colours()], result.spread);
 }
 
-/** A pair that changes takes along all that was said and made of it. */
+/** A changed pair clears all messages and results. */
 function forget(): void {
     pair = found = result = before = undefined;
     suspicions = [];
@@ -550,7 +550,7 @@ function forget(): void {
 
 const colours = (): Colours => by<HTMLSelectElement>('colours').value as Colours;
 
-/** What the worker holds is gone once it was replaced. */
+/** Whether the worker still holds the result; a replaced worker does not. */
 function held(): boolean {
     return result !== undefined && result.generation === client.generation;
 }
@@ -558,7 +558,7 @@ function held(): boolean {
 async function picture(of: Map): Promise<Picture | undefined> {
     const mine = result;
     if (mine && !mine.pictures[of]) {
-        // Confidence is no distance: it has a scale of its own.
+        // Confidence is not a distance, so it has its own colours.
         mine.pictures[of] = await client.call('picture', of, of === 'confidence' ? 'grey' : colours());
     }
     return mine?.pictures[of];
@@ -572,7 +572,7 @@ async function showView(): Promise<void> {
         return;
     }
     if (!mine) {
-        // What there is to see before there is a map.
+        // Shows the views until there is a map.
         map.show(pair.left, pair.left);
         readOut(undefined);
         return;
@@ -606,7 +606,7 @@ async function showView(): Promise<void> {
     by('map').dataset['shown'] = shown;
 }
 
-/** Both views at once. What is in the middle of the disparities stays where it is. */
+/** Shows both views, aligned at the middle of the disparity range. */
 function showStereo({ left, right }: Pair, { min, max }: Range): void {
     const moved = aligned(right, (min + max) / 2);
     if (by<HTMLSelectElement>('stereo').value === 'anaglyph') {
@@ -618,7 +618,7 @@ function showStereo({ left, right }: Pair, { min, max }: Range): void {
     }
 }
 
-/** A disparity with as many digits as a legend takes. */
+/** A disparity with the digits of a legend. */
 const pixels = (value: number): string => String(Number(value.toFixed(1)));
 
 function select(to: View): void {
@@ -633,7 +633,7 @@ function select(to: View): void {
     void showView();
 }
 
-/** Says what is known of a pixel. */
+/** Shows the values of a pixel. */
 function readOut(pixel: Pixel | undefined): void {
     if (!result || !facts || !pixel) {
         const hint = result ? 'Point at a pixel to read its disparity.' : 'The left view. Match the pair to see its maps.';
@@ -643,7 +643,7 @@ function readOut(pixel: Pixel | undefined): void {
     say('readout', told(pixel, result, facts, points.known));
 }
 
-/** Matches by the other path too. */
+/** Matches on the other device and compares. */
 async function compare(): Promise<void> {
     const { signal } = turns;
     await alone(signal, async () => {

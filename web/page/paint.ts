@@ -1,8 +1,8 @@
-// Maps as pictures, where the engine has no longer what they are of.
+// Colours maps in the page, when the engine no longer holds them.
 
 import type { Picture, Range } from './protocol';
 
-/** Disparities in the colours of a scale of 256 entries, RGB, from its least to its largest; black where there is none. */
+/** Applies a colour scale of 256 RGB entries to disparities; missing ones are black. */
 export function painted(width: number, height: number, disparity: Float32Array, scale: Uint8Array, { min, max }: Range): Picture {
     const pixels = new Uint8ClampedArray(4 * disparity.length);
     disparity.forEach((value, i) => {

@@ -1,4 +1,4 @@
-// The tab with the points: the cameras that they take, and which of them are shown.
+// The points tab: its cameras, and the filter by confidence.
 
 import type { CloudView } from './cloud';
 import { by, count, say, words } from './dom';
@@ -10,7 +10,7 @@ type Field = keyof typeof FIELDS;
 const ALL = Object.keys(FIELDS) as Field[];
 const field = (key: Field) => by<HTMLInputElement>(FIELDS[key]);
 
-/** Where the cameras come from. */
+/** Source of the cameras. */
 type Source = 'calibration' | 'given' | 'guess';
 
 const NOTES: Record<Exclude<Source, 'calibration'>, string> = {
@@ -21,18 +21,18 @@ const NOTES: Record<Exclude<Source, 'calibration'>, string> = {
 export class PointsTab {
     private view: CloudView | undefined;
     private source: Source = 'guess';
-    /** The files of the calibration. */
+    /** File names of the calibration. */
     private files = '';
     private size = { width: 0, height: 0 };
-    /** Whether the points that are shown are of this result and these cameras. */
+    /** Whether the shown points belong to this result and these cameras. */
     private fresh = false;
-    /** How many points have at least this confidence. */
+    /** Number of points with at least this confidence. */
     private atLeast = new Uint32Array(257);
     private open = false;
-    /** The points that are asked for. */
+    /** The pending request for points. */
     private readonly turns = new Turns();
 
-    /** `points` asks the engine; `changed` is called when the cameras change. */
+    /** `points` calls the engine; `changed` is called when the cameras change. */
     constructor(
         private readonly points: (cameras: Cameras) => Promise<Cloud>,
         private readonly changed: () => void,
@@ -48,7 +48,7 @@ export class PointsTab {
         by('reset-view').addEventListener('click', () => this.view?.rest());
     }
 
-    /** The cameras of the form; undefined where a number is missing or makes no sense. */
+    /** The cameras of the form; undefined if a number is missing or invalid. */
     get cameras(): Cameras | undefined {
         const of = (key: Field) => field(key).valueAsNumber;
         const cameras = { focalLength: of('focalLength'), cx: of('cx'), cy: of('cy'), doffs: of('doffs'), baseline: of('baseline') };
@@ -56,7 +56,7 @@ export class PointsTab {
         return sound ? { ...cameras, unit: by<HTMLSelectElement>('unit').value } : undefined;
     }
 
-    /** The cameras, where they are more than a guess. */
+    /** The cameras, unless they are a guess. */
     get known(): Cameras | undefined {
         return this.source === 'guess' ? undefined : this.cameras;
     }
@@ -65,10 +65,10 @@ export class PointsTab {
         return by<HTMLInputElement>('least').valueAsNumber;
     }
 
-    /** A new pair, whose cameras its calib.txt may tell. */
+    /** Takes a new pair, with its cameras if a calibration gives them. */
     pair(width: number, height: number, read: Cameras | undefined, files: string): void {
         this.files = files;
-        // What was typed in holds for the next pair of this size.
+        // Typed cameras are kept for the next pair of the same size.
         const same = this.size.width === width && this.size.height === height;
         this.size = { width, height };
         if (read || this.source !== 'given' || !same || !this.cameras) {
@@ -83,7 +83,7 @@ export class PointsTab {
         this.note();
     }
 
-    /** The pair is gone, and with it all but what was typed in. */
+    /** Clears everything but typed cameras. */
     forget(): void {
         this.result(false);
         if (this.source !== 'given') {
@@ -97,7 +97,7 @@ export class PointsTab {
         }
     }
 
-    /** There is a result, or none any more. The points of an earlier one go. */
+    /** Called when there is a result or none any more; drops earlier points. */
     result(there: boolean): void {
         this.turns.next();
         this.view?.clear();
@@ -109,7 +109,7 @@ export class PointsTab {
         }
     }
 
-    /** The tab is opened, or another one is. */
+    /** Called when this tab or another one is selected. */
     select(open: boolean, there: boolean): void {
         this.open = open;
         if (open && there && !this.fresh) {
@@ -119,7 +119,7 @@ export class PointsTab {
         }
     }
 
-    /** Gets the viewer, so that points appear at once. Answers with whether there are any to show. */
+    /** Loads the viewer, so that points appear at once. Returns whether there are points to show. */
     async prepare(): Promise<boolean> {
         try {
             await this.viewer();
@@ -191,7 +191,7 @@ export class PointsTab {
         }
     }
 
-    /** The slider ends where a point in a hundred is left. */
+    /** Limits the slider to the confidence of the best percent of the points. */
     private reach(): void {
         const slider = by<HTMLInputElement>('least');
         const all = this.atLeast[0] ?? 0;

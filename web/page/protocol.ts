@@ -1,10 +1,10 @@
-// What page and worker say to each other. Each call has one answer; progress comes in between.
+// Messages between page and worker. Each call has one reply; progress messages may precede it.
 
 export type Device = 'gpu' | 'cpu';
 export type Colours = 'turbo' | 'viridis' | 'grey';
-/** The maps that are shown as pictures. */
+/** The maps shown as pictures. */
 export type Map = 'disparity' | 'confidence' | 'validity';
-/** What can be saved: words of `mrfgs match --also`, and the map itself in both formats. */
+/** The maps that can be saved, named as in `mrfgs match --also`, and the disparities in both formats. */
 export type Output = 'pfm' | 'raw' | 'png' | 'confidence' | 'validity';
 
 export interface Preset {
@@ -12,25 +12,25 @@ export interface Preset {
     about: string;
 }
 
-/** One bit of the validity map; bit 0 stands for "measured and trusted". */
+/** One bit of the validity map; bit 0 stands for "measured and reliable". */
 export interface Reason {
     bit: number;
     name: string;
     about: string;
-    /** That of pixels for which it decides; undefined where it never does. */
+    /** Colour of pixels for which this reason decides; undefined if it never does. */
     colour: Uint8Array | undefined;
 }
 
-/** What the engine says of itself. */
+/** Properties of the engine. */
 export interface Facts {
     version: string;
     presets: Preset[];
     reasons: Reason[];
-    /** 256 colours each, RGB. */
+    /** 256 RGB colours each. */
     scales: Record<Colours, Uint8Array>;
 }
 
-/** Disparities in pixels, both ends included. */
+/** Disparities in pixels, inclusive. */
 export interface Range {
     min: number;
     max: number;
@@ -48,13 +48,13 @@ export interface Pair {
     right: Picture;
 }
 
-/** A pair that was rectified, with what was done, and the cameras where they are known. */
+/** A rectified pair with notes, and the cameras if known. */
 export interface Rectified extends Pair {
     notes: string[];
     cameras: Cameras | undefined;
 }
 
-/** A file of a calibration. */
+/** A calibration file. */
 export interface Text {
     name: string;
     text: string;
@@ -71,16 +71,16 @@ export interface Known {
     notes: string[];
 }
 
-/** What is probably wrong, in the program's words, and what the page can do about it. */
+/** A likely problem, and the remedy that the page can apply. */
 export interface Warning {
     text: string;
     remedy: 'swap' | 'rectify' | 'widen' | undefined;
-    /** The range to take instead. */
+    /** The range to use instead. */
     min?: number;
     max?: number;
 }
 
-/** At which size a pair is matched: with `automatic` at half of it where the memory is short. */
+/** Size at which a pair is matched; `automatic` halves it if the memory is insufficient. */
 export type Size = 'automatic' | 'full' | 'half';
 
 export interface Result {
@@ -89,24 +89,24 @@ export interface Result {
     range: Range;
     iterations: number;
     device: string;
-    /** Why the CPU path stepped in. */
+    /** Why the CPU was used instead of the GPU. */
     note: string | undefined;
     warnings: Warning[];
-    /** What was corrected in the pair, in words. */
+    /** The corrections made to the pair, in words. */
     corrected: string;
     tiles: number;
-    /** Whether it was matched at half its size, and whether because the memory is short. */
+    /** Whether it was matched at half size, and whether for lack of memory. */
     half: boolean;
     short: boolean;
-    /** The disparities between which nearly all measured pixels are. */
+    /** The range of nearly all measured disparities. */
     spread: Range;
-    /** Of the match alone, in milliseconds. */
+    /** Duration of the match alone, in ms. */
     took: number;
-    /** Pixels; +infinity where there is none. */
+    /** In pixels; +Infinity where missing. */
     disparity: Float32Array<ArrayBuffer>;
     confidence: Uint8Array<ArrayBuffer>;
     validity: Uint8Array<ArrayBuffer>;
-    /** Of disparities, in the colours that were asked for. */
+    /** The disparities in the requested colours. */
     picture: Picture;
 }
 
@@ -124,32 +124,32 @@ export interface Cameras {
     cy: number;
     doffs: number;
     baseline: number;
-    /** mm, cm, m, or unknown. */
+    /** mm, cm, m or unknown. */
     unit: string;
 }
 
 export interface Cloud {
-    /** x to the right, y down, z forward of the left camera. */
+    /** x right, y down, z forward of the left camera. */
     positions: Float32Array<ArrayBuffer>;
     colours: Uint8Array<ArrayBuffer>;
     confidences: Uint8Array<ArrayBuffer>;
     count: number;
 }
 
-/** The calls that the worker takes, with their arguments and answers. */
+/** The calls of the worker, with arguments and results. */
 export interface Calls {
     start(): Facts;
-    /** Opens a device; answers with its name for people. */
+    /** Opens a device and returns its display name. */
     open(device: Device): string;
-    /** Decodes both images. They stay the worker's pair until the next call. */
+    /** Decodes both images and makes them the worker's pair. */
     pair(left: Blob, leftName: string, right: Blob, rightName: string): Pair;
-    /** The range that sparse matches find. */
+    /** The range found by sparse matching. */
     range(): Range | undefined;
-    /** What is probably wrong with the pair or with this range. */
+    /** Likely problems of the pair or of this range. */
     warnings(range: Range | undefined): Warning[];
-    /** Matches over a range, which may become wider where sparse matches `found` it. */
+    /** Matches over a range, which may be widened if sparse matching `found` it. */
     match(device: Device, preset: string, range: Range, found: boolean, size: Size, colours: Colours): Result;
-    /** Matches the same pair by another path, and counts the pixels that differ. */
+    /** Matches the same pair on another device, and counts the pixels that differ. */
     compare(device: Device): Comparison;
     picture(map: Map, colours: Colours): Picture;
     file(output: Output): Uint8Array<ArrayBuffer>;
@@ -165,13 +165,13 @@ export interface Calls {
 
 export type Name = keyof Calls;
 
-/** What the page sends. */
+/** Messages of the page. */
 export type Request = { cancel: true } | { [N in Name]: { id: number; call: N; args: Parameters<Calls[N]> } }[Name];
 
-/** What the worker sends. */
+/** Messages of the worker. */
 export type Reply =
     | { id: number; value: ReturnType<Calls[Name]> }
     | { id: number; error: string; why: 'refused' | 'interrupted' }
     | { stage: string; done: number }
-    /** The engine cannot go on; the page ends this worker. */
+    /** The engine has crashed; the page replaces this worker. */
     | { broken: string };

@@ -1,11 +1,11 @@
-// What is known of a pixel, in one line.
+// The readout of a pixel in one line.
 
 import { named } from './legend';
 import type { Pixel } from './map-view';
 import type { Cameras, Facts, Result } from './protocol';
 import { inUnit, place } from './ruler';
 
-/** The line for a pixel of a result; its depth by the cameras, where these are known. */
+/** The readout of a pixel; includes the depth if the cameras are known. */
 export function told(pixel: Pixel, result: Result, facts: Facts, cameras: Cameras | undefined): string {
     const at = pixel.y * result.width + pixel.x;
     const [disparity, confidence, validity] = [result.disparity[at] ?? Infinity, result.confidence[at] ?? 0, result.validity[at] ?? 0];

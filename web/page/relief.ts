@@ -1,15 +1,15 @@
-// Light from the upper left on a map, so that small steps are seen.
+// Shades a map with light from the upper left, so that small steps become visible.
 
 import type { Picture, Range } from './protocol';
 
-/** How much darker or lighter a slope may become. */
+/** Limits of the shading. */
 const DARKEST = 0.55;
 const LIGHTEST = 1.3;
 
-/** The picture of a map, lit; the steeper a place is against the `spread` of all, the stronger. */
+/** Shades the picture of a map by the slope of the disparity relative to the `spread`. */
 export function lit({ width, height, pixels }: Picture, disparity: Float32Array, { min, max }: Range): Picture {
     const lit = new Uint8ClampedArray(pixels);
-    // A step of 1/40 of all disparities from pixel to pixel is as steep as it gets.
+    // A step of 1/40 of the range per pixel has the strongest shading.
     const strength = 40 / Math.max(1, max - min);
     const at = (x: number, y: number) => disparity[Math.min(y, height - 1) * width + Math.min(x, width - 1)] ?? Infinity;
     for (let y = 0; y < height; y += 1) {

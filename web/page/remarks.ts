@@ -1,14 +1,14 @@
-// What is said of a pair and of its result, each with a button for what helps.
+// Warnings and notes about a pair and its result, with buttons for remedies.
 
 import { by, make, sentence } from './dom';
 import type { Range, Warning } from './protocol';
 
-/** What the buttons do. Each matches again. */
+/** Actions of the buttons. Each matches again. */
 export interface Help {
     swap(): void;
     rectify(): void;
     widen(range: Range): void;
-    /** Without a rectification. */
+    /** Without rectification. */
     asTheyAre(): void;
     atFullSize(): void;
 }
@@ -18,7 +18,7 @@ const REMEDIES: Record<NonNullable<Warning['remedy']>, string> = { swap: 'Swap t
 export class Remarks {
     constructor(private readonly help: Help) {}
 
-    /** Says what is probably wrong. */
+    /** Shows warnings. */
     warn(warnings: Warning[]): void {
         const unique = warnings.filter(({ text }, i) => warnings.findIndex((other) => other.text === text) === i);
         by('warnings').replaceChildren(
@@ -29,7 +29,7 @@ export class Remarks {
         );
     }
 
-    /** Says what was done to a pair, with the way back where it was `rectified`, and to full size where the memory was `short`. */
+    /** Shows notes, with buttons to undo a rectification, and to use full size if the memory was `short`. */
     note(notes: string[], rectified: boolean, short = false): void {
         const lines = notes.map((text) => make('li', {}, `${sentence(text)}. `));
         if (rectified) {

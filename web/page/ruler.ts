@@ -1,23 +1,23 @@
-// How far two points of the scene are apart.
+// Measures the distance of two points in the scene.
 
 import { by, say } from './dom';
 import type { Pixel } from './map-view';
 import type { Cameras } from './protocol';
 
-/** Where a pixel of this disparity is: x to the right, y down, z forward of the left camera; undefined where it is nowhere. */
+/** The 3-D point of a pixel (x right, y down, z forward of the left camera); undefined if it has no finite depth. */
 export function place({ x, y }: Pixel, disparity: number, { focalLength, cx, cy, doffs, baseline }: Cameras): [number, number, number] | undefined {
     const z = (focalLength * baseline) / (disparity + doffs);
     return z > 0 && Number.isFinite(z) ? [((x - cx) * z) / focalLength, ((y - cy) * z) / focalLength, z] : undefined;
 }
 
-/** A length in this unit, for people. */
+/** Formats a length in this unit. */
 export const inUnit = (length: number, unit: string): string =>
     `${length.toPrecision(5)} ${unit === 'unknown' ? 'in the unit of the baseline' : unit}`;
 
 export class Ruler {
     private ends: Pixel[] = [];
 
-    /** `disparity` tells that of a pixel, infinite where there is none; `cameras` those that are known, and `size` that of the map. */
+    /** `disparity` returns that of a pixel, infinite if missing; `cameras` the known ones, and `size` that of the map. */
     constructor(
         private readonly disparity: (pixel: Pixel) => number,
         private readonly cameras: () => Cameras | undefined,
@@ -33,7 +33,7 @@ export class Ruler {
         return by('measure').getAttribute('aria-pressed') === 'true';
     }
 
-    /** Takes an end; the third begins anew. */
+    /** Sets an end; the third pick starts over. */
     pick(pixel: Pixel): void {
         if (this.on) {
             this.ends = [...(this.ends.length < 2 ? this.ends : []), pixel];
@@ -41,13 +41,13 @@ export class Ruler {
         }
     }
 
-    /** For another map. */
+    /** Resets the ruler for another map. */
     clear(): void {
         this.ends = [];
         this.draw();
     }
 
-    /** Says what it measures, by the cameras that are known now. */
+    /** Shows the measurement with the current cameras. */
     draw(): void {
         const { width, height } = this.size() ?? { width: 1, height: 1 };
         const [a, b] = this.ends;

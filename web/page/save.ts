@@ -1,4 +1,4 @@
-// Files for the user.
+// Downloads for the user.
 
 import { make } from './dom';
 
@@ -9,11 +9,11 @@ export function save(bytes: Uint8Array<ArrayBuffer>, name: string, type: string)
     document.body.append(link);
     link.click();
     link.remove();
-    // The browser has taken the file by then.
+    // By then the browser has read the data.
     setTimeout(() => URL.revokeObjectURL(url), 60_000);
 }
 
-/** The name of a pair's files: that of the scene, or of the left view without the folder and the extension. */
+/** The prefix of saved files: the scene, or the left file without folder and extension. */
 export function stem(left: string): string {
     return left.replace(/^.*[\\/]/, '').replace(/\.[^.]*$/, '').replace(/[^\p{L}\p{N}._-]+/gu, '-') || 'pair';
 }

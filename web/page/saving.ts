@@ -1,15 +1,15 @@
-// What a result is saved as.
+// The file formats of results.
 
 import type { Client } from './client';
 import type { Cameras, Output, Picture, Result } from './protocol';
 import { save } from './save';
 
-/** The files that a result is offered as: those of the engine, and those that are made of its maps. */
+/** The files that can be saved: those of the engine, and those made from its maps. */
 export type File = Output | 'ply' | 'mesh' | 'glb';
 
 const BINARY = 'application/octet-stream';
 
-/** Saves a file of the result; its name begins with `name`. Points and meshes take cameras, and have at least this confidence. */
+/** Saves a file of the result, prefixed with `name`. Points and meshes need cameras, and are filtered by confidence. */
 export async function saveFile(
     client: Client,
     file: File,

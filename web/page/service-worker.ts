@@ -1,12 +1,12 @@
-// Serves the page from a cache, so that it opens without a network. Each build has a cache of its own, named by the content of its
-// files; what did not change is copied from the one before. A new build waits until a page asks for it, or until
-// the pages of the old one are closed, because they may still load chunks.
+// Serves the page from a cache, so that it opens offline. Each build has its own cache, named after the digest of its files; unchanged
+// files are copied from the previous one. A new build waits until a page asks for it, or the pages of the old one are closed, as they
+// may still load chunks.
 
 export {};
 
 declare const self: ServiceWorkerGlobalScope;
 
-/** All files of the page but the scenes, and the digest of their content; the build fills them in. */
+/** All files of the page except the scenes, and the digest of their content; inserted by the build. */
 declare const FILES: string[];
 declare const DIGEST: string;
 
@@ -14,7 +14,7 @@ declare const DIGEST: string;
 const PREFIX = `mrfgs ${self.registration.scope} `;
 const NAME = PREFIX + DIGEST;
 
-/** Names that hold a hash of the content never change it. */
+/** Files with a content hash in their name never change. */
 const hashed = (url: string) => /-[0-9A-Z]{8}\.\w+$/.test(url);
 
 async function install(): Promise<void> {
@@ -23,7 +23,7 @@ async function install(): Promise<void> {
         FILES.map(async (file) => {
             const url = new URL(file, self.registration.scope).href;
             const known = hashed(url) ? await caches.match(url) : undefined;
-            // Past the browser's own cache, which may hold an older page.
+            // Bypasses the browser's cache, which may hold an older page.
             const answer = known ?? (await fetch(url, { cache: hashed(url) ? 'default' : 'reload' }));
             if (!answer.ok) {
                 throw new Error(`${url}: ${answer.status}`);
@@ -49,7 +49,7 @@ async function answer(request: Request): Promise<Response> {
         return known;
     }
     const fetched = await fetch(request);
-    // Scenes stay once they were opened.
+    // Scenes are cached when they are opened.
     if (fetched.ok && url.pathname.includes('/scenes/')) {
         await cache.put(url.href, fetched.clone());
     }

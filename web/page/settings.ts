@@ -1,4 +1,4 @@
-// Preset, range and device, as the form has them.
+// Preset, range and device in the form.
 
 import { by, make, say } from './dom';
 import type { Device, Preset, Range, Size } from './protocol';
@@ -7,13 +7,13 @@ const radio = (name: string) => document.querySelector<HTMLInputElement>(`input[
 
 export class Settings {
     private presets: Preset[] = [];
-    /** The preset that somebody has chosen. */
+    /** The preset chosen by the user. */
     chosen: string | undefined;
-    /** Whether somebody has typed in the range; the page may have, too. */
+    /** Whether the user has typed a range; the page may also fill it in. */
     private typed = false;
-    /** Whether somebody has chosen the size. */
+    /** Whether the user has chosen the size. */
     private sized = false;
-    /** That of the pair. */
+    /** Size of the pair. */
     private pixels = { width: 0, height: 0 };
 
     /** `ranged` is called when the range changes. */
@@ -56,7 +56,7 @@ export class Settings {
         this.sized = false;
     }
 
-    /** A pair comes. What the page has set for an earlier one does not hold for it, and a range that was typed in only where it has the same size. */
+    /** Takes a new pair: resets what the page has set, and a typed range unless the size is the same. */
     pair(width: number, height: number): void {
         const same = this.pixels.width === width && this.pixels.height === height;
         const first = this.pixels.width === 0;
@@ -74,13 +74,13 @@ export class Settings {
         return radio('range') === 'automatic';
     }
 
-    /** The range that was typed in; undefined where it makes none. */
+    /** The typed range; undefined if invalid. */
     get given(): Range | undefined {
         const [min, max] = ['min', 'max'].map((id) => by<HTMLInputElement>(id).valueAsNumber) as [number, number];
         return Number.isInteger(min) && Number.isInteger(max) && min <= max ? { min, max } : undefined;
     }
 
-    /** Takes what a link holds; what makes no sense is left out. */
+    /** Applies the settings in a link, ignoring invalid ones. */
     take(link: URLSearchParams): void {
         const preset = link.get('preset');
         if (this.presets.some(({ name }) => name === preset) && preset) {
@@ -100,7 +100,7 @@ export class Settings {
         this.about();
     }
 
-    /** Takes the GPU from the choice, and says why. Unless a preset was chosen, the one for speed is. */
+    /** Disables the GPU and says why. Selects the fast preset unless the user has chosen one. */
     withoutGpu(reason: string): void {
         const [gpu, cpu] = ['gpu', 'cpu'].map((value) => document.querySelector<HTMLInputElement>(`input[value="${value}"]`));
         if (gpu && cpu) {
@@ -114,13 +114,13 @@ export class Settings {
         say('device-note', reason);
     }
 
-    /** A range that was found is a good start for one that is given. */
+    /** Fills in a found range as the start for a typed one. */
     suggest({ min, max }: Range): void {
         by<HTMLInputElement>('min').value = String(min);
         by<HTMLInputElement>('max').value = String(max);
     }
 
-    /** Gives a range in the place of what is given or found. */
+    /** Sets a range instead of the automatic one. */
     give(range: Range): void {
         (document.querySelector('input[name="range"][value="given"]') as HTMLInputElement).checked = true;
         by('ends').hidden = false;

@@ -1,16 +1,16 @@
-// A pair by the camera of this device: one view, a step to the right, the other view.
+// Takes a pair with the camera of this device: one view, a step to the right, the other view.
 
 import { by, say, words } from './dom';
 import type { Named } from './dropped';
 import { Turns } from './turns';
 
-/** What the dialog says before each shot. */
+/** The instructions before each shot. */
 const SHOTS = [
     { which: 'left', take: 'Take the left view', about: 'Point at something that stands still, with things near and far.' },
     { which: 'right', take: 'Take the right view', about: 'Now move a hand’s width to the right without turning, at the same height, and take the same again.' },
 ] as const;
 
-/** Offers the camera where there is one; `taken` gets both views. */
+/** Offers the camera if there is one; `taken` receives both views. */
 export function offerCamera(taken: (views: Named[]) => void): void {
     const devices = navigator.mediaDevices as MediaDevices | undefined;
     by('open-camera').hidden = !devices;
@@ -27,7 +27,7 @@ class Shots {
     private views: Named[] = [];
     /** Whether a shot is being taken. */
     private busy = false;
-    /** The dialog, from its opening to its end. */
+    /** The dialog while it is open. */
     private readonly turns = new Turns();
 
     constructor(
@@ -36,7 +36,7 @@ class Shots {
     ) {
         by('shoot').addEventListener('click', () => void this.shoot());
         by('close-camera').addEventListener('click', () => this.dialog.close());
-        // By Escape, too.
+        // Also on Escape.
         this.dialog.addEventListener('close', () => this.stop());
     }
 
@@ -67,7 +67,7 @@ class Shots {
         }
     }
 
-    /** What the next shot is of. */
+    /** Asks for the next shot. */
     private ask(): void {
         const shot = SHOTS[this.views.length];
         if (shot) {

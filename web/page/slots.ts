@@ -1,4 +1,4 @@
-// The two views and how they come in: dropped, pasted, chosen, or from a rendered scene.
+// The slots of the two views and their sources: drop, paste, file dialog, rendered scene.
 
 import { type Cut, cut, decoded, guess, views } from './decode';
 import { by, count, make, say, words } from './dom';
@@ -15,39 +15,39 @@ export interface View {
     file: Blob;
     name: string;
     header: Header;
-    /** What its slot shows of it, hidden until it is drawn. */
+    /** The thumbnail in the slot, hidden until it is drawn. */
     thumb: HTMLCanvasElement;
-    /** Whether somebody has said which view it is. */
+    /** Whether the user has chosen the side. */
     placed: boolean;
-    /** That which came with its pair. */
+    /** The calibration given with its pair. */
     calibration: Text[];
 }
 
 type Views = Partial<Record<Side, View>>;
 
-/** A rendered scene of the project, as the build finds it. */
+/** A rendered scene of the project, listed by the build. */
 export interface Scene {
     name: string;
     title: string;
 }
 
-/** What is wanted of a pair that has changed. */
+/** What to do with a changed pair. */
 export interface Wish {
-    /** To be matched at once. */
+    /** Match at once. */
     match?: boolean;
-    /** To be rectified by its matches. */
+    /** Rectify by matches. */
     rectify?: 'matches';
-    /** It is the same pair, with its views swapped. */
+    /** The same pair with its views swapped. */
     swapped?: boolean;
 }
 
 /** Where files come from. */
 interface Source {
-    /** The slot that they are for. */
+    /** The slot that they were given to. */
     side?: Side | undefined;
-    /** What their pair is called, where that is more than the names of the files. */
+    /** Name of the pair, if it is not that of its files. */
     name?: string | undefined;
-    /** The scene that they are of. */
+    /** The scene that they belong to. */
     scene?: string;
     wish?: Wish;
 }
@@ -58,27 +58,27 @@ const keeping = (files: Text[]): string => `${listed(files)} is kept for your pa
 /** The files that a calibration may have. */
 const MOST = 3;
 const READS = 'PNG, JPEG, WebP, AVIF, GIF, PNM, TIFF or PFM';
-/** Files that hold a calibration, or a list that is not for us. */
+/** Files that may be a calibration. */
 const TEXT = /\.(txt|ya?ml|json|xml|ini|conf|cfg|calib|toml)$/i;
-/** What a folder of a benchmark holds beside the views. */
+/** Other files in the folders of benchmarks. */
 const OTHER = /^(disp|mask|readme|license|\.)|GT\b|\.(pfm|py|md)$/i;
 
 export class Slots {
-    /** They change together with all else that is said of the pair, once new files are read. */
+    /** Changes only together with everything else about the pair, once new files are read. */
     views: Views = {};
-    /** The scene that the views are of. */
+    /** The scene of the views. */
     scene: string | undefined;
-    /** What the pair is called, where that is more than the names of its files. */
+    /** Name of the pair, if it is not that of its files. */
     name: string | undefined;
-    /** Whether nobody has given or asked for anything yet. */
+    /** Whether the user has not given or asked for anything yet. */
     untouched = true;
-    /** The image that came last, alone. */
+    /** The last image, if it came alone. */
     private last: View | undefined;
-    /** A calibration that came before its pair. */
+    /** A calibration that was given before its pair. */
     private kept: Text[] = [];
-    /** Ends when all is taken in that has come. */
+    /** Resolves when all given files are processed. */
     private queue: Promise<void> = Promise.resolve();
-    /** The scene that is fetched. */
+    /** The scene being fetched. */
     private readonly fetches = new Turns();
 
     /** `changed` is called after every change of a view or of the calibration; `isWhole` says whether files are all of a calibration. */
@@ -92,7 +92,7 @@ export class Slots {
             input.addEventListener('change', () => {
                 void this.take([...(input.files ?? [])].map(named), { side });
             });
-            // The same file can be chosen again.
+            // Allows the same file to be chosen again.
             input.addEventListener('click', () => (input.value = ''));
             input.addEventListener('cancel', () => this.hold(side));
         }
@@ -109,19 +109,19 @@ export class Slots {
         return SIDES.map((side) => this.views[side]?.calibration ?? []).find((files) => files.length > 0) ?? [];
     }
 
-    /** One thing after the other, in the order in which they come: each finds what the one before has left. */
+    /** Runs actions one after another in order of arrival, as each depends on the state left by the one before. */
     private inTurn(act: () => Promise<void>): Promise<void> {
         this.untouched = false;
         this.queue = this.queue.then(act).catch((error) => say('pair-problem', words(error)));
         return this.queue;
     }
 
-    /** Files from anywhere: one for a slot, or two that are told apart by their names, and a calibration. */
+    /** Takes files: one for a slot, or two that are told apart by their names, and a calibration. */
     take(files: Named[], source: Source = {}): Promise<void> {
         return files.length > 0 ? this.inTurn(() => this.add(files, source)) : Promise.resolve();
     }
 
-    /** Takes files, or says why not; then all stays as it is. */
+    /** Takes files, or reports why not and changes nothing. */
     private async add(files: Named[], source: Source): Promise<void> {
         this.quiet();
         const { side } = source;
@@ -177,7 +177,7 @@ export class Slots {
             }
         }
         const beside = side && pair ? views[other(side)] : undefined;
-        // Not where both views change, one after the other.
+        // Not if both views are replaced one after the other.
         const stays = beside !== this.last ? beside : undefined;
         this.put(views, source, calibration, view);
         say('pair-problem', problem);
@@ -224,7 +224,7 @@ export class Slots {
         }
     }
 
-    /** Views with one more: in its slot, or where there is room. Where there is none it begins a new pair. */
+    /** Adds a view: in its slot, or in an empty one; with none empty it begins a new pair. */
     private joined(views: Views, view: View, side: Side | undefined): Views {
         if (side) {
             return { ...views, [side]: view };
@@ -238,11 +238,11 @@ export class Slots {
         return { left: one, right: two };
     }
 
-    /** These are the views from now on, of which one may have come `alone`. */
+    /** Sets the views, one of which may have come `alone`. */
     private put(views: Views, { scene, name = scene, wish = {} }: Source, calibration: Text[] = [], alone?: View): void {
         const { left, right } = views;
         if (scene === undefined) {
-            // What somebody gives takes the place of a scene that is still on its way.
+            // Files from the user take precedence over a scene that is still loading.
             this.fetches.next();
         }
         [this.views, this.scene, this.name, this.last] = [views, scene, name, alone];
@@ -263,13 +263,13 @@ export class Slots {
         this.changed(wish);
     }
 
-    /** The image that came last, where it has no other one of its size: it may hold both views. */
+    /** The last image, if no other has its size, so that it may hold both views. */
     private whole(views: Views, last = this.last): View | undefined {
         const sizes = Object.values(views).map(({ header: { size } }) => `${size?.width} ${size?.height}`);
         return sizes.length === 2 && sizes[0] === sizes[1] ? undefined : last;
     }
 
-    /** Cuts an image into both views. */
+    /** Splits an image into both views. */
     private async cut(one: View | undefined, how: Cut, calibration: Text[] = []): Promise<void> {
         if (!one) {
             return;
@@ -288,20 +288,20 @@ export class Slots {
         say('pair-note', how === 'beside' ? 'Cut into its left and right half.' : 'Cut into its upper half, as the left view, and its lower half.');
     }
 
-    /** What is wrong with a view, at its slot. */
+    /** Reports a problem at the slot of a view. */
     problem(side: Side, text: string | undefined): void {
         say(`${side}-problem`, text);
         by<HTMLInputElement>(`${side}-file`).setAttribute('aria-invalid', String(Boolean(text)));
     }
 
-    /** Takes back what was said of the pair. */
+    /** Clears the messages about the pair. */
     private quiet(): void {
         SIDES.forEach((side) => this.problem(side, undefined));
         say('pair-problem', undefined);
         say('pair-note', undefined);
     }
 
-    /** The engine's picture of a view, which also shows what the browser cannot decode. */
+    /** Shows the engine's picture of a view, which also works for formats that the browser cannot decode. */
     show(side: Side, picture: Picture): void {
         const whole = new OffscreenCanvas(picture.width, picture.height);
         whole.getContext('2d')?.putImageData(new ImageData(picture.pixels, picture.width, picture.height), 0, 0);
@@ -315,7 +315,7 @@ export class Slots {
         const known = await header(file).catch((error) => {
             throw new Error(`${name} cannot be read: ${words(error)}`);
         });
-        // What the engine does not read, the browser may.
+        // The browser may decode formats that the engine does not read.
         const read = known ? file : await decoded(file);
         const found = known ?? (read && (await header(read)));
         if (!read || !found) {
@@ -324,7 +324,7 @@ export class Slots {
         return { file: read, name, header: found, thumb: make('canvas', { hidden: true }), placed, calibration: [] };
     }
 
-    /** The slots say what they hold. */
+    /** Updates the slots. */
     private render(): void {
         for (const side of SIDES) {
             const [slot, view] = [by(side), this.views[side]];
@@ -343,7 +343,7 @@ export class Slots {
         by('cut').hidden = !this.whole(this.views);
     }
 
-    /** The input holds the file of its view, for those who are read what it holds. */
+    /** Puts the file of a view into its input, for screen readers. */
     private hold(side: Side): void {
         const view = this.views[side];
         const transfer = new DataTransfer();
@@ -353,7 +353,7 @@ export class Slots {
         by<HTMLInputElement>(`${side}-file`).files = transfer.files;
     }
 
-    /** Each view takes the place of the other one; the pair is to be matched at once where that is asked. Not after `signal` has ended it. */
+    /** Swaps the views, and matches them at once if requested. Does nothing if `signal` has been aborted. */
     swap(match = false, signal?: AbortSignal): Promise<void> {
         return this.inTurn(async () => {
             const { left, right } = this.views;
@@ -379,14 +379,14 @@ export class Slots {
         return button;
     }
 
-    /** Loads the pictures of the scenes, for which the first map does not wait. */
+    /** Loads the thumbnails of the scenes after the first map. */
     illustrate(): void {
         for (const button of by('scenes').querySelectorAll('button')) {
             (button.querySelector('img') as HTMLImageElement).src = `scenes/${button.dataset['scene']}/small.png`;
         }
     }
 
-    /** Opens a scene, and has it matched. */
+    /** Opens a scene and matches it. */
     async open(name: string): Promise<void> {
         this.untouched = false;
         const signal = this.fetches.next();
@@ -451,7 +451,7 @@ export class Slots {
         return SIDES.find((side) => !this.views[side]);
     }
 
-    /** Says at the empty slot that its view is missing. */
+    /** Asks for the missing view at its slot. */
     askFor(side: Side): void {
         if (!by(`${side}-problem`).textContent) {
             const has = this.views[other(side)] ? ' too' : '';
@@ -461,7 +461,7 @@ export class Slots {
     }
 }
 
-/** What the browser makes of a view, until the engine has its own picture. */
+/** The browser's preview of a view, until the engine provides its own. */
 async function preview({ file, thumb }: View): Promise<void> {
     const bitmap = thumb.hidden ? await createImageBitmap(file).catch(() => undefined) : undefined;
     if (bitmap && thumb.hidden) {
@@ -470,7 +470,7 @@ async function preview({ file, thumb }: View): Promise<void> {
     bitmap?.close();
 }
 
-/** Draws a small picture. */
+/** Draws a thumbnail. */
 function draw(canvas: HTMLCanvasElement, image: CanvasImageSource & { width: number; height: number }): void {
     const scale = Math.min(1, 320 / Math.max(image.width, image.height));
     [canvas.width, canvas.height] = [image.width, image.height].map((s) => Math.max(1, Math.round(s * scale))) as [number, number];

@@ -1,11 +1,11 @@
-// The disparities that colours are spread over.
+// The range of disparities that the colours cover.
 
 import type { Range } from './protocol';
 
-/** The share of the measured pixels at either end that have the colour of the end. */
+/** Share of the measured pixels beyond either end of the colours. */
 const OUTSIDE = 0.01;
 
-/** The disparities between which nearly all measured pixels are, so that these take all colours; the `searched` ones where that says nothing. */
+/** The range of nearly all measured disparities, to use all colours; falls back to the `searched` range. */
 export function spread(disparity: Float32Array, validity: Uint8Array, searched: Range): Range {
     const every = Math.max(1, Math.floor(disparity.length / 200_000));
     const some: number[] = [];

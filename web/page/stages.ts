@@ -1,4 +1,4 @@
-// What the steps of a match are called, and how long it still takes.
+// Names of the steps of a match, and the remaining time.
 
 const PREPARING = new Set(['half_size', 'double_size', 'illumination', 'conditioning', 'zones', 'matches', 'label_range', 'upload']);
 const CLEANING = new Set([
@@ -6,15 +6,15 @@ const CLEANING = new Set([
     ...['support', 'enlarge', 'download'],
 ]);
 
-/** What a step is for, in words. */
+/** The description of a step. */
 export function phase(stage: string): string {
     return PREPARING.has(stage) ? 'Preparing the views' : CLEANING.has(stage) ? 'Cleaning up' : 'Matching';
 }
 
-/** Before so much of a match is done, and so many milliseconds have passed, nothing is said of the time left. */
+/** Limits below which the remaining time is not estimated. */
 const EARLY = { done: 0.05, time: 1000 };
 
-/** The time left in words, by the time that the share `done` has taken; undefined while it is early. */
+/** The remaining time in words, extrapolated from the share `done`; undefined while too early. */
 export function left(done: number, milliseconds: number): string | undefined {
     if (done < EARLY.done || milliseconds < EARLY.time) {
         return undefined;

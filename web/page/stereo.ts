@@ -1,11 +1,11 @@
-// Both views at once, for two eyes: through glasses of two colours, or in turns.
+// Shows both views: as an anaglyph, or alternating.
 
 import type { Picture } from './protocol';
 
-/** Frames of a wiggle in a second. */
+/** Frames of a wiggle per second. */
 const FRAMES = 5;
 
-/** The right view, so far to the right that what has this disparity stays where the left view has it. */
+/** The right view shifted so that points with this disparity coincide with the left view. */
 export function aligned({ width, height, pixels }: Picture, disparity: number): Picture {
     const by = Math.round(disparity);
     const moved = new Uint8ClampedArray(pixels.length);
@@ -20,7 +20,7 @@ export function aligned({ width, height, pixels }: Picture, disparity: number): 
     return { width, height, pixels: moved };
 }
 
-/** For glasses that are red on the left and cyan on the right: the left view is grey, so that strong colours do not flicker. */
+/** An anaglyph for red-cyan glasses; the left view is grey to reduce retinal rivalry. */
 export function anaglyph(left: Picture, right: Picture): Picture {
     const pixels = new Uint8ClampedArray(right.pixels);
     for (let i = 0; i < pixels.length; i += 4) {
@@ -31,11 +31,11 @@ export function anaglyph(left: Picture, right: Picture): Picture {
     return { width: left.width, height: left.height, pixels };
 }
 
-/** Shows one picture after the other, again and again. */
+/** Shows pictures in turn, repeatedly. */
 export class Wiggle {
     private timer: ReturnType<typeof setInterval> | undefined;
 
-    /** From now on these. */
+    /** Starts with these pictures. */
     start(pictures: Picture[], show: (picture: Picture) => void): void {
         this.stop();
         let at = 0;

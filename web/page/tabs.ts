@@ -1,4 +1,4 @@
-// A list of tabs: arrow keys move between them, as the ARIA practices say.
+// A tab list with arrow keys as in the ARIA practices.
 
 export function tabs(list: HTMLElement, selected: (tab: HTMLElement) => void): { select(tab: HTMLElement): void } {
     const all = [...list.querySelectorAll<HTMLElement>('[role="tab"]')];

@@ -1,6 +1,6 @@
-// What is under way: what begins ends what began before it.
+// Tasks of which a new one cancels the previous one.
 
-/** One thing at a time. Who has awaited something asks the signal of its thing whether that still counts. */
+/** One task at a time. Code that has awaited something checks the signal of its task before it goes on. */
 export class Turns {
     private now = new AbortController();
 
@@ -8,7 +8,7 @@ export class Turns {
         return this.now.signal;
     }
 
-    /** Begins the next thing, which ends with `whole`, too, where it is a part of that. */
+    /** Starts the next task, which also ends with `whole` if it is part of another one. */
     next(whole?: AbortSignal): AbortSignal {
         this.now.abort();
         const begun = new AbortController();

@@ -1,4 +1,4 @@
-// What to do where there is no WebGPU.
+// What to do without WebGPU.
 
 const SAME = 'The CPU path is used: the same maps, bit for bit. It starts with the preset for speed, fast.';
 

@@ -1,4 +1,4 @@
-// Runs the engine, so that the page stays responsive and a match can be ended at any time.
+// Runs the engine, so that the page stays responsive and a match can be stopped at any time.
 
 import init, * as engine from 'engine';
 import { broken, buffers, own, words } from './answers';
@@ -6,12 +6,12 @@ import type { Calls, Cameras, Device, Name, Pair, Picture, Range, Reply, Request
 import { spread } from './spread';
 
 declare const self: DedicatedWorkerGlobalScope;
-/** The compiled engine beside this file; the build fills it in. */
+/** The compiled engine beside this file; inserted by the build. */
 declare const ENGINE: string;
 
 let pair: engine.StereoPair | undefined;
 let matched: engine.Matched | undefined;
-/** What `matched` was made with. */
+/** The settings that `matched` was made with. */
 let made: { preset: string; range: Range; found: boolean; half: boolean; spread: Range } | undefined;
 let cancelled = false;
 const matchers = new Map<Device, engine.Matcher>();
@@ -22,10 +22,10 @@ async function matcher(device: Device): Promise<engine.Matcher> {
     return open;
 }
 
-/** What the engine calls a device whose name the browser hides. */
+/** Name of a device whose name the browser hides. */
 const UNNAMED = 'WebGPU';
 
-/** The device's name for people. Browsers hide it, or tell of its maker and architecture alone, which the engine does not see. */
+/** The display name of the device. Browsers hide it, or give only vendor and architecture, which the engine does not see. */
 async function named(device: string): Promise<string> {
     if (device !== UNNAMED) {
         return device;
@@ -43,7 +43,7 @@ function need<T>(value: T | undefined, what: string): T {
     return value;
 }
 
-/** Frees what `use` is given, whatever happens. */
+/** Calls `use` with a value and frees it, even if it throws. */
 async function using<T extends { free(): void }, R>(value: T, use: (value: T) => R | Promise<R>): Promise<R> {
     try {
         return await use(value);
@@ -62,7 +62,7 @@ function pictures(of: engine.StereoPair): Pair {
     return { left, right };
 }
 
-/** What `Cameras` says; it is freed. */
+/** Converts cameras of the engine, and frees them. */
 function told(of: engine.Cameras | undefined): Cameras | undefined {
     if (!of) {
         return undefined;
@@ -76,7 +76,7 @@ const known = (files: Text[]) => new engine.Known(files.map(({ name }) => name),
 
 const ends = ({ min, max }: Range, found: boolean) => (found ? new engine.Range(min, max).found() : new engine.Range(min, max));
 
-/** Whether the pair is matched at half its size, and whether that is because it takes too much memory otherwise. */
+/** Whether to match at half size, and whether for lack of memory. */
 async function halved(preset: string, range: Range, size: Size): Promise<{ half: boolean; short: boolean }> {
     if (size !== 'automatic') {
         return { half: size === 'half', short: false };
@@ -88,7 +88,7 @@ async function halved(preset: string, range: Range, size: Size): Promise<{ half:
             if (broken(error)) {
                 throw error;
             }
-            // Not even in tiles.
+            // It does not fit even in tiles.
             return true;
         }
     });
@@ -105,7 +105,7 @@ async function run(device: Device, preset: string, range: Range, wide: boolean, 
     };
     const found = await using(ends(range, wide), (over) => path.match(views, preset, over, progress, half));
     if (found.note !== undefined && matchers.delete(device)) {
-        // A device that failed is opened anew.
+        // A device that failed is reopened.
         path.free();
     }
     return { found, took: performance.now() - begun };
@@ -157,7 +157,7 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
         const raw = need(pair, 'pair');
         const by = files ? await using(known(files), (of) => of.rectify(raw)) : engine.Rectified.byMatches(raw);
         const [notes, cameras] = [by.notes, told(by.cameras())];
-        // This call frees what it is asked of.
+        // This call consumes its object.
         pair = by.pair();
         raw.free();
         return { ...pictures(pair), notes, cameras };
@@ -172,13 +172,13 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
         return { min, max };
     },
     warnings(range) {
-        // This call takes the range and frees it.
+        // This call consumes the range.
         return need(pair, 'pair').warnings(range && new engine.Range(range.min, range.max)) as Warning[];
     },
     async match(device, preset, range, wide, size, colours) {
         const { half, short } = await halved(preset, range, size);
         const { found, took } = await run(device, preset, range, wide, half);
-        // The last one stays until there is another.
+        // The last result is kept until there is another.
         matched?.free();
         const { width, height, min, max, iterations, note, corrected, tiles } = found;
         const [disparity, validity] = [own(found.disparity()), own(found.validity())];
@@ -255,5 +255,5 @@ self.addEventListener('message', ({ data }: MessageEvent<Request>) => {
     }
 });
 
-// A trap in what nothing awaits.
+// Reports a trap in a promise that nothing awaits.
 self.addEventListener('unhandledrejection', (event) => post({ broken: words(event.reason) }));

@@ -1,4 +1,4 @@
-//! mrfgs in a browser: what the page calls. Native programs use the crate `mrfgs`.
+//! The engine of the page, for WebAssembly. Native programs use the crate `mrfgs`.
 
 #![cfg(target_arch = "wasm32")]
 #![allow(unreachable_pub, reason = "JavaScript reaches it")]
@@ -13,10 +13,10 @@ mod words;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-/// What a function throws: an error whose message is for people.
+/// Errors are thrown as JavaScript errors with a message for the user.
 type Thrown<T> = Result<T, js_sys::Error>;
 
-/// Shows where a panic happened, in the console.
+/// Prints panics to the console.
 #[wasm_bindgen(start)]
 pub fn start() {
     console_error_panic_hook::set_once();

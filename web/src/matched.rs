@@ -1,4 +1,4 @@
-//! What comes out: maps, pictures, files and points.
+//! Results of a match: maps, pictures, files and points.
 
 use crate::Thrown;
 use crate::object::set;
@@ -15,7 +15,7 @@ use mrfgs::image::{Plane, Rect};
 use std::path::Path;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-/// The maps of a pair, and what made them.
+/// The maps of a pair, and how they were computed.
 #[wasm_bindgen]
 pub struct Matched {
     pub(crate) matched: mrfgs::Matched,
@@ -47,26 +47,25 @@ impl Matched {
         self.matched.range().max
     }
 
-    /// Iterations done.
+    /// Number of iterations done.
     #[wasm_bindgen(getter)]
     pub fn iterations(&self) -> u32 {
         self.matched.iterations
     }
 
-    /// What ran the stages, for people.
+    /// The device that ran the match, for display.
     #[wasm_bindgen(getter)]
     pub fn device(&self) -> String {
         self.matched.ran_on.clone()
     }
 
-    /// Why it did not run on the GPU, where that is so.
+    /// Why the match did not run on the GPU, if it was to.
     #[wasm_bindgen(getter)]
     pub fn note(&self) -> Option<String> {
         self.matched.note.as_ref().map(error)
     }
 
-    /// What is probably wrong with the pair or the range: `{ text, remedy }`, where the remedy "widen" has the range to take, `min` and
-    /// `max`.
+    /// Likely problems of the pair or the range: `{ text, remedy }`. The remedy "widen" also has the range to use, `min` and `max`.
     #[must_use]
     pub fn warnings(&self) -> Array {
         let of = |cause: &Warning| {
@@ -85,41 +84,41 @@ impl Matched {
         self.matched.warnings().iter().map(of).collect()
     }
 
-    /// What was done to the pair so that it could be matched, in words; empty where nothing was.
+    /// The corrections made to the pair before matching, in words; empty if there were none.
     #[wasm_bindgen(getter)]
     pub fn corrected(&self) -> String {
         self.matched.conditioning.to_string()
     }
 
-    /// The number of tiles that it was cut into; 1 where it was not.
+    /// Number of tiles; 1 if the pair was not split.
     #[wasm_bindgen(getter)]
     pub fn tiles(&self) -> usize {
         self.matched.tiles.count()
     }
 
-    /// The disparity of every pixel, in pixels; +Infinity where there is none.
+    /// Disparity of each pixel in pixels; +Infinity where missing.
     #[must_use]
     pub fn disparity(&self) -> Vec<f32> {
         self.matched.disparity().into_data()
     }
 
-    /// The confidence of every pixel, 0 to 255.
+    /// Confidence of each pixel, 0 to 255.
     #[must_use]
     pub fn confidence(&self) -> Vec<u8> {
         self.matched.confidence().data().to_vec()
     }
 
-    /// Why each pixel is what it is.
+    /// Flags of each pixel: `reasons` explains the bits.
     #[must_use]
     pub fn validity(&self) -> Vec<u8> {
         self.matched.validity().data().to_vec()
     }
 
-    /// The map "disparity", "raw", "confidence" or "validity" as a picture, RGBA; the first two in the colours "turbo", "viridis" or
-    /// "grey", from the disparity `min` to `max`.
+    /// The map "disparity", "raw", "confidence" or "validity" as an RGBA picture. Disparities from `min` to `max` use the colour map
+    /// "turbo", "viridis" or "grey".
     ///
     /// # Errors
-    /// Where there is no such map, or there are no such colours.
+    /// If there is no such map or colour map.
     pub fn picture(&self, map: &str, colours: &str, min: f32, max: f32) -> Thrown<Vec<u8>> {
         let maps = &self.matched.maps;
         let picture = match map {
@@ -130,20 +129,20 @@ impl Matched {
         Ok(rgba(&picture.crop(&Rect::whole((self.width(), self.height())))))
     }
 
-    /// The map "disparity" or "raw" as the program writes it to PFM.
+    /// The map "disparity" or "raw" as a PFM file.
     ///
     /// # Errors
-    /// Where there is no such map.
+    /// If there is no such map.
     pub fn pfm(&self, map: &str) -> Thrown<Vec<u8>> {
         Writer::default()
             .encode_disparity(Path::new("disparity.pfm"), &self.disparities(map)?)
             .map_err(thrown)
     }
 
-    /// The map "disparity", "raw", "confidence" or "validity" as the program writes it to PNG: disparities times 256 in 16 bits.
+    /// The map "disparity", "raw", "confidence" or "validity" as a PNG file: disparities times 256 in 16 bits.
     ///
     /// # Errors
-    /// Where there is no such map, and for disparities that PNG cannot hold.
+    /// If there is no such map, or a disparity does not fit into PNG.
     pub fn png(&self, map: &str) -> Thrown<Vec<u8>> {
         let path = Path::new("disparity.png");
         match map {
@@ -154,13 +153,13 @@ impl Matched {
         .map_err(thrown)
     }
 
-    /// The points that were measured and are trusted, with the colours of `pair`.
+    /// The points that were measured and are reliable, with the colours of `pair`.
     #[must_use]
     pub fn points(&self, cameras: &Cameras, pair: &StereoPair) -> Points {
         Points { points: self.cloud(cameras, pair).points }
     }
 
-    /// The points of at least this confidence as the program writes them to PLY.
+    /// The points of at least this confidence as a PLY file.
     #[must_use]
     pub fn ply(&self, cameras: &Cameras, pair: &StereoPair, least_confidence: u8) -> Vec<u8> {
         let mut cloud = self.cloud(cameras, pair);
@@ -168,7 +167,7 @@ impl Matched {
         ply::encode(&cloud)
     }
 
-    /// The number of pixels in which any map differs, of all where the sizes do.
+    /// Number of pixels that differ in any map; all of them if the sizes differ.
     #[must_use]
     pub fn differing(&self, other: &Matched) -> usize {
         let (a, b) = (&self.matched.maps, &other.matched.maps);
@@ -199,7 +198,7 @@ impl Matched {
     }
 }
 
-/// A cloud of points, in the frame of the left camera: x to the right, y down, z forward.
+/// A point cloud in the frame of the left camera: x right, y down, z forward.
 #[wasm_bindgen]
 pub struct Points {
     points: Vec<Point>,
@@ -207,37 +206,37 @@ pub struct Points {
 
 #[wasm_bindgen]
 impl Points {
-    /// The number of points.
+    /// Number of points.
     #[wasm_bindgen(getter)]
     pub fn count(&self) -> usize {
         self.points.len()
     }
 
-    /// x, y and z of each.
+    /// x, y and z of each point.
     #[wasm_bindgen(getter)]
     pub fn positions(&self) -> Vec<f32> {
         self.points.iter().flat_map(|point| point.position).collect()
     }
 
-    /// Red, green and blue of each.
+    /// Red, green and blue of each point.
     #[wasm_bindgen(getter)]
     pub fn colours(&self) -> Vec<u8> {
         self.points.iter().flat_map(|point| point.colour).collect()
     }
 
-    /// The confidence of each.
+    /// Confidence of each point.
     #[wasm_bindgen(getter)]
     pub fn confidences(&self) -> Vec<u8> {
         self.points.iter().map(|point| point.confidence).collect()
     }
 }
 
-/// The colours called `name`.
+/// The colour map named `name`.
 pub(crate) fn colours(name: &str) -> Thrown<ColourMap> {
     match name {
         "turbo" => Ok(ColourMap::Turbo),
         "viridis" => Ok(ColourMap::Viridis),
         "grey" => Ok(ColourMap::Grey),
-        _ => Err(js_sys::Error::new(&format!("there are no colours {name:?}"))),
+        _ => Err(js_sys::Error::new(&format!("there is no colour map {name:?}: use turbo, viridis or grey"))),
     }
 }

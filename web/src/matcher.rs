@@ -1,4 +1,4 @@
-//! The matcher.
+//! The matcher for JavaScript.
 
 use crate::Thrown;
 use crate::matched::Matched;
@@ -17,14 +17,14 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 thread_local! {
-    /// Who listens to the match that runs. It stays here, since listeners of the library may move between threads.
+    /// Progress callback of the current match. It is stored here, as the library requires callbacks that can be sent between threads.
     static LISTENER: RefCell<Option<Function>> = const { RefCell::new(None) };
 }
 
-/// What a match may take of the 4 GiB that WebAssembly can address, in MiB: the views, their pictures and the maps are there too.
+/// Memory limit of a match in MiB. WebAssembly can address 4 GiB, which also hold the views, their pictures and the maps.
 pub const MEMORY: u32 = 1536;
 
-/// Matches pair after pair, and keeps the device in between.
+/// Matches pairs one after another, and keeps the device open in between.
 #[wasm_bindgen]
 pub struct Matcher {
     matcher: mrfgs::Matcher,
@@ -33,25 +33,25 @@ pub struct Matcher {
 
 #[wasm_bindgen]
 impl Matcher {
-    /// Opens "gpu", where the CPU path steps in if it fails later, or "cpu".
+    /// Opens the device "gpu", which falls back to the CPU if it fails later, or "cpu".
     ///
     /// # Errors
-    /// Where the browser shows no GPU.
+    /// If the browser provides no GPU.
     pub async fn open(device: &str) -> Thrown<Matcher> {
         open(device).await.map_err(thrown)
     }
 
-    /// What runs the stages, for people.
+    /// The device that runs matches, for display.
     #[wasm_bindgen(getter)]
     pub fn device(&self) -> String {
         self.device.clone()
     }
 
-    /// Matches `pair` over `range`. `progress` hears of each stage that begins and of the share of the work that is done, and answers
-    /// whether to go on. With `half`, the pair is matched at half its size. One that takes more than [`MEMORY`] is matched in tiles.
+    /// Matches `pair` over `range`. `progress` is called with the stage and the fraction of the work done, and returns whether to continue.
+    /// With `half`, the pair is matched at half size. A pair that needs more than [`MEMORY`] is matched in tiles.
     ///
     /// # Errors
-    /// Where the pair cannot be matched, or the listener has stopped it.
+    /// If the pair cannot be matched, or `progress` stopped the match.
     #[wasm_bindgen(js_name = "match")]
     pub async fn run(
         &mut self,
@@ -77,7 +77,7 @@ impl Matcher {
 /// The number of tiles in which a pair would be matched.
 ///
 /// # Errors
-/// Where no tile is small enough.
+/// If no tile is small enough.
 #[wasm_bindgen]
 pub fn tiles(pair: &StereoPair, preset: &str, range: &Range, half: bool) -> Thrown<usize> {
     let (width, height) = pair.pair.size();
@@ -88,7 +88,7 @@ pub fn tiles(pair: &StereoPair, preset: &str, range: &Range, half: bool) -> Thro
     count().map_err(|error: Error| thrown(error))
 }
 
-/// The method of a preset in the memory of a browser.
+/// The method of a preset, with the memory limit of a browser.
 fn method(preset: &str, half: bool) -> Result<Method> {
     let mut method = Method::preset(preset)?;
     method.tiles.memory = method.tiles.memory.min(MEMORY);
@@ -104,13 +104,13 @@ async fn open(device: &str) -> Result<Matcher> {
         let matcher = mrfgs::Matcher::builder().execution(cpu).build_async().await?;
         return Ok(Matcher { matcher, device: "the CPU path".into() });
     }
-    // Also a software device, which `auto` would not take.
+    // Unlike `auto`, this also accepts software devices.
     let gpu = Gpu::open_async(None, FaultInjection::default()).await?;
     let device = gpu.describe();
     Ok(Matcher { matcher: mrfgs::Matcher::on(Ok(gpu), true, &Execution::default())?, device })
 }
 
-/// Tells the listener. One that fails cannot answer, and stops the match.
+/// Calls the progress callback. A callback that throws stops the match.
 fn tell(progress: Progress) -> ControlFlow<()> {
     let goes_on = LISTENER.with_borrow(|listener| {
         listener.as_ref().is_none_or(|listener| {

@@ -1,9 +1,8 @@
-//! Plain objects of JavaScript.
+//! Plain JavaScript objects.
 
 use js_sys::{Object, Reflect};
 use wasm_bindgen::JsValue;
 
-/// An object with these entries.
 pub(crate) fn object(entries: &[(&str, JsValue)]) -> JsValue {
     let object = Object::new().into();
     for (key, value) in entries {
@@ -14,6 +13,6 @@ pub(crate) fn object(entries: &[(&str, JsValue)]) -> JsValue {
 
 /// Sets an entry of such an object.
 pub(crate) fn set(object: &JsValue, key: &str, value: JsValue) {
-    // A plain object takes every key.
+    // Setting a property of a plain object cannot fail.
     let _ = Reflect::set(object, &key.into(), &value);
 }

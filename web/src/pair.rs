@@ -1,4 +1,4 @@
-//! What goes in: a pair, the range to search, and the cameras.
+//! Inputs of a match: a pair, the range to search, and the cameras.
 
 use crate::Thrown;
 use crate::words::{By, thrown, warning};
@@ -19,18 +19,18 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen]
 pub struct StereoPair {
     pub(crate) pair: Pair,
-    /// What has rectified it, where it was not.
+    /// How it was rectified, if it had to be.
     pub(crate) by: Option<By>,
-    /// The distance of the principal points along the row, in pixels, where a calibration has rectified it.
+    /// Horizontal distance of the principal points in pixels, if a calibration has rectified the pair.
     pub(crate) doffs: Option<f64>,
 }
 
 #[wasm_bindgen]
 impl StereoPair {
-    /// The pair in two files, which errors call by their names. Images that are stored turned, are turned upright.
+    /// Decodes a pair from two files, whose names appear in errors. The orientation stored in the files is applied.
     ///
     /// # Errors
-    /// Where a file is no image, or the images differ in size.
+    /// If a file is not an image, or the images differ in size.
     #[wasm_bindgen(constructor)]
     pub fn new(left: &[u8], left_name: &str, right: &[u8], right_name: &str) -> Thrown<Self> {
         let files = ((Path::new(left_name), left), (Path::new(right_name), right));
@@ -38,10 +38,10 @@ impl StereoPair {
         Ok(Self { pair: reader.pair_in_memory(files.0, files.1).map_err(thrown)?, by: None, doffs: None })
     }
 
-    /// The pair in memory: rows of grey, grey and alpha, RGB or RGBA without gaps, as many channels as the samples are for.
+    /// A pair from memory: rows of grey, grey and alpha, RGB or RGBA without gaps. The number of samples gives the number of channels.
     ///
     /// # Errors
-    /// Where samples are missing, or the images differ in size.
+    /// If samples are missing, or the images differ in size.
     pub fn of_samples8(
         left: &[u8],
         left_width: usize,
@@ -53,10 +53,10 @@ impl StereoPair {
         of_samples((left, (left_width, left_height)), (right, (right_width, right_height)))
     }
 
-    /// The same with samples of 16 bits.
+    /// Like `of_samples8`, with 16-bit samples.
     ///
     /// # Errors
-    /// Where samples are missing, or the images differ in size.
+    /// If samples are missing, or the images differ in size.
     pub fn of_samples16(
         left: &[u16],
         left_width: usize,
@@ -80,17 +80,17 @@ impl StereoPair {
         self.pair.size().1
     }
 
-    /// A view, "left" or "right", as RGBA.
+    /// The view "left" or "right" as RGBA.
     #[must_use]
     pub fn picture(&self, view: &str) -> Vec<u8> {
         let image = if view == "right" { self.pair.right() } else { self.pair.left() };
         rgba(&image.to_rgb8())
     }
 
-    /// The disparities that sparse matches find, if they find enough.
+    /// The disparity range found by sparse matching, if it finds enough matches.
     ///
     /// # Errors
-    /// Where there is not enough memory.
+    /// If there is not enough memory.
     pub fn range(&self) -> Thrown<Option<Range>> {
         let found = match self.doffs {
             Some(doffs) => check::range_of_cameras(&self.pair, doffs),
@@ -103,10 +103,10 @@ impl StereoPair {
         }
     }
 
-    /// What is probably wrong with the pair, and with the range where one was given: `{ text, remedy }`.
+    /// Likely problems of the pair, and of the range if one is given: `{ text, remedy }`.
     #[must_use]
     pub fn warnings(&self, range: Option<Range>) -> Array {
-        // A range that was found does not show what the user knows.
+        // Only a range from the user is informative.
         let given = range.filter(|range| !range.found).map(|range| range.range);
         check::warnings(&self.pair, given).iter().map(|cause| warning(cause, self.by.as_ref())).collect()
     }
@@ -122,12 +122,12 @@ fn of_samples<S: Sample>(left: (&[S], (usize, usize)), right: (&[S], (usize, usi
     Ok(StereoPair { pair: pair.map_err(thrown)?, by: None, doffs: None })
 }
 
-/// Disparities to search, in pixels, both ends included.
+/// Disparities to search, in pixels, inclusive.
 #[wasm_bindgen]
 #[derive(Clone, Copy)]
 pub struct Range {
     pub(crate) range: DisparityRange,
-    /// Whether sparse matches found it: a match may widen it.
+    /// Whether sparse matching found it, so that a match may widen it.
     pub(crate) found: bool,
 }
 
@@ -136,25 +136,25 @@ impl Range {
     /// The disparities from `min` to `max`.
     ///
     /// # Errors
-    /// Where there are none, or too many.
+    /// If there are none, or too many.
     #[wasm_bindgen(constructor)]
     pub fn new(min: i32, max: i32) -> Thrown<Self> {
         Ok(Self { range: DisparityRange::new(min, max).map_err(thrown)?, found: false })
     }
 
-    /// The same as one that [`StereoPair::range`] has found.
+    /// Marks the range as one from [`StereoPair::range`].
     #[must_use]
     pub fn found(self) -> Self {
         Self { found: true, ..self }
     }
 
-    /// The least one.
+    /// The least disparity.
     #[wasm_bindgen(getter)]
     pub fn min(&self) -> i32 {
         self.range.min
     }
 
-    /// The largest one.
+    /// The largest disparity.
     #[wasm_bindgen(getter)]
     pub fn max(&self) -> i32 {
         self.range.max
@@ -172,11 +172,11 @@ pub struct Cameras {
 
 #[wasm_bindgen]
 impl Cameras {
-    /// Cameras with this focal length and principal point of the left one, and this distance of the principal points along the
-    /// row, all in pixels; the unit of `baseline`, mm, cm, m or unknown, is that of the points.
+    /// Cameras with this focal length, principal point of the left camera, and horizontal distance of the principal points, in pixels.
+    /// Points are in the unit of `baseline`: mm, cm, m or unknown.
     ///
     /// # Errors
-    /// Where focal length or baseline are not above 0, and for another unit.
+    /// If focal length or baseline are not above 0, or for another unit.
     #[wasm_bindgen(constructor)]
     pub fn new(focal_length: f64, cx: f64, cy: f64, doffs: f64, baseline: f64, unit: &str) -> Thrown<Self> {
         let text = format!(
@@ -185,7 +185,7 @@ impl Cameras {
         Self::of(&Calibration::of_text(Path::new("calib.txt"), &text).map_err(thrown)?)
     }
 
-    /// Focal length across, in pixels.
+    /// Horizontal focal length in pixels.
     #[wasm_bindgen(getter)]
     pub fn focal_length(&self) -> f64 {
         self.camera.focal_length[0]
@@ -203,19 +203,19 @@ impl Cameras {
         self.camera.principal_point[1]
     }
 
-    /// Distance of the principal points along the row, in pixels.
+    /// Horizontal distance of the principal points in pixels.
     #[wasm_bindgen(getter)]
     pub fn doffs(&self) -> f64 {
         self.doffs
     }
 
-    /// Distance of the cameras.
+    /// Distance of the cameras, in `unit`.
     #[wasm_bindgen(getter)]
     pub fn baseline(&self) -> f64 {
         self.baseline
     }
 
-    /// The unit of that distance: mm, cm, m or unknown.
+    /// Unit of the baseline: mm, cm, m or unknown.
     #[wasm_bindgen(getter)]
     pub fn unit(&self) -> String {
         self.rig.unit().name().into()
@@ -223,10 +223,10 @@ impl Cameras {
 }
 
 impl Cameras {
-    /// Those of a calibration.
+    /// The cameras of a calibration.
     ///
     /// # Errors
-    /// Where it lacks a value.
+    /// If a value is missing.
     pub(crate) fn of(calibration: &Calibration) -> Thrown<Self> {
         let rig = Rig::new(calibration).map_err(thrown)?;
         let (Some(camera), Some(doffs), Some(baseline)) =
@@ -238,7 +238,7 @@ impl Cameras {
     }
 }
 
-/// A picture as a canvas takes it.
+/// Converts a picture to RGBA for a canvas.
 pub(crate) fn rgba(picture: &Plane<[u8; 3]>) -> Vec<u8> {
     picture.data().iter().flat_map(|&[r, g, b]| [r, g, b, u8::MAX]).collect()
 }

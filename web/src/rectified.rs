@@ -1,4 +1,4 @@
-//! What is known of two cameras, and pairs that are rectified by it or by their own matches.
+//! Calibrations, and pairs rectified by a calibration or by their own matches.
 
 use crate::Thrown;
 use crate::pair::{Cameras, StereoPair};
@@ -10,7 +10,7 @@ use mrfgs::rectification::{Doubt, Options, Rectification};
 use std::path::Path;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-/// What a calibration says of two cameras, in any form that the program reads.
+/// A stereo calibration in any format that the program reads.
 #[wasm_bindgen]
 pub struct Known {
     known: StereoCalibration,
@@ -19,10 +19,10 @@ pub struct Known {
 
 #[wasm_bindgen]
 impl Known {
-    /// The calibration in these files, each with the name by which errors call it.
+    /// Reads the calibration from these files, whose names appear in errors.
     ///
     /// # Errors
-    /// Where they are no calibration, or lack a value.
+    /// If the files are not a calibration, or a value is missing.
     #[wasm_bindgen(constructor)]
     pub fn new(names: Vec<String>, texts: Vec<String>) -> Thrown<Self> {
         let files: Vec<_> = names.iter().map(Path::new).zip(texts).collect();
@@ -56,7 +56,7 @@ impl Known {
     /// Rectifies a pair.
     ///
     /// # Errors
-    /// Where the calibration lacks what this takes, or is for images of another size.
+    /// If the calibration is incomplete, or for images of another size.
     pub fn rectify(&self, pair: &StereoPair) -> Thrown<Rectified> {
         let by = Rectification::for_pair(&self.known, &pair.pair, &Options::default());
         let by = by.map_err(|error| match error {
@@ -137,7 +137,7 @@ impl Rectified {
     /// Rectifies a pair by its own matches.
     ///
     /// # Errors
-    /// Where these do not tell how.
+    /// If the matches do not determine a rectification.
     #[wasm_bindgen(js_name = "byMatches")]
     pub fn by_matches(pair: &StereoPair) -> Thrown<Rectified> {
         let by = Rectification::of_pair(&pair.pair, &Options::default()).map_err(thrown)?;
@@ -148,13 +148,13 @@ impl Rectified {
         Ok(rectified)
     }
 
-    /// What was done, and how far it can be trusted.
+    /// What was done, and doubts about its accuracy.
     #[wasm_bindgen(getter)]
     pub fn notes(&self) -> Vec<String> {
         self.notes.clone()
     }
 
-    /// The cameras, where they are known. They are given away.
+    /// The cameras, if known. This moves them out.
     pub fn cameras(&mut self) -> Option<Cameras> {
         self.cameras.take()
     }

@@ -1,4 +1,4 @@
-//! What the page shows beside the maps: version, presets, reasons and colours.
+//! Tables for the page: version, presets, reasons and colours.
 
 use crate::Thrown;
 use crate::matched::colours;
@@ -18,7 +18,7 @@ pub fn version() -> String {
     env!("CARGO_PKG_VERSION").into()
 }
 
-/// Name and purpose of each preset: `{ name, about }`.
+/// Name and description of each preset: `{ name, about }`.
 #[wasm_bindgen]
 #[must_use]
 pub fn presets() -> Array {
@@ -28,7 +28,7 @@ pub fn presets() -> Array {
         .collect()
 }
 
-/// The bits of the validity map: `{ bit, name, about, colour }`. The first that a pixel has, from the top, decides its colour.
+/// The bits of the validity map: `{ bit, name, about, colour }`. If a pixel has several, the first in the order of `VALIDITY` decides its colour.
 #[wasm_bindgen]
 #[must_use]
 pub fn reasons() -> Array {
@@ -42,10 +42,10 @@ pub fn reasons() -> Array {
     REASONS.iter().map(reason).collect()
 }
 
-/// 256 colours, RGB, from the least to the largest value.
+/// The 256 RGB colours of a colour map, from the least to the largest value.
 ///
 /// # Errors
-/// Where there are no such colours.
+/// If there is no such colour map.
 #[wasm_bindgen]
 pub fn scale(name: &str) -> Thrown<Vec<u8>> {
     let ramp = Plane::from_fn(256, 1, |x, _| x as f32);

@@ -1,4 +1,4 @@
-//! What the library reports, in the words of the page, each cause with the field that helps, or in those of the package for npm.
+//! Messages of the library, in the terms of the page, or in those of the package for npm.
 
 use mrfgs::Error;
 use mrfgs::check::Warning;
@@ -15,7 +15,7 @@ const PAGE: Vocabulary = Vocabulary {
     max: "the upper end",
     range: Some("disparity range"),
     cpu: "use the program in place of the browser",
-    driver: ["take one that has WebGPU", "update its driver or the browser"],
+    driver: ["use one with WebGPU", "update its driver or the browser"],
     unit: Some("choose the right one in the tab Points"),
     ..Vocabulary::PLAIN
 };
@@ -25,7 +25,7 @@ const PACKAGE: Vocabulary = Vocabulary {
     min: "minDisparity",
     max: "maxDisparity",
     cpu: "use device: 'cpu', or the program mrfgs",
-    mask: Some("give alpha 0 to what is no image"),
+    mask: Some("set alpha to 0 outside the image"),
     range: None,
     ..PAGE
 };
@@ -34,36 +34,36 @@ thread_local! {
     static WORDS: Cell<&'static Vocabulary> = const { Cell::new(&PAGE) };
 }
 
-/// What has rectified a pair.
+/// How a pair was rectified.
 #[derive(Clone, Copy)]
 pub(crate) enum By {
     Calibration,
     Matches,
 }
 
-/// From now on names what the package for npm takes, and not the fields of the page.
+/// Makes messages name the options of the package for npm instead of the fields of the page.
 #[wasm_bindgen]
 pub fn for_package() {
     WORDS.set(&PACKAGE);
 }
 
-/// What is thrown for an error of the library.
+/// Converts an error of the library to a JavaScript error.
 pub(crate) fn thrown(error: impl Into<Error>) -> js_sys::Error {
     js_sys::Error::new(&self::error(&error.into()))
 }
 
-/// An error with its remedy.
+/// The text of an error, with its remedy.
 pub(crate) fn error(error: &Error) -> String {
     remedy::error(error, WORDS.get())
 }
 
-/// A doubt about a rectification, with its remedy.
+/// The text of a doubt about a rectification, with its remedy.
 pub(crate) fn doubt(doubt: &Doubt) -> String {
     remedy::doubt(doubt, WORDS.get())
 }
 
-/// A warning of `pair` or of its maps as `{ text, remedy }`: with what helps in words, and where the page can do it, as "swap", "rectify"
-/// or "widen", or else undefined.
+/// A warning about a pair or its maps as `{ text, remedy }`. The text includes a remedy; `remedy` is "swap", "rectify" or "widen" if the
+/// page can apply it, or undefined.
 pub(crate) fn warning(warning: &Warning, by: Option<&By>) -> JsValue {
     let text = match by {
         Some(by) => remedy::of_rectified(warning, matches!(by, By::Calibration), WORDS.get()),

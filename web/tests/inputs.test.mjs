@@ -1,4 +1,4 @@
-// How views come in, and what the page says of what it cannot use. It works on after each.
+// Ways to give views, and messages about unusable files. The page must keep working after each.
 import assert from 'node:assert/strict';
 import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -24,7 +24,7 @@ describe('inputs', () => {
         await visit.close();
     });
 
-    /** A good pair matches as ever, and nothing of the trouble is left. */
+    /** A good pair still matches, and earlier messages are gone. */
     async function works() {
         await visit.set({ range: 'automatic' });
         await visit.pair(scene('thin'), join(scene('thin'), 'calib.txt'));
@@ -46,7 +46,7 @@ describe('inputs', () => {
             ['imgL.png', 'imgR.png'],
             ['leftImage.png', 'rightImage.png'],
             ['000010_0.png', '000010_1.png'],
-            // Numbers of any length, and words before numbers: the right view may have been taken first.
+            // Numbers of any length; words take precedence, as the right view may have been taken first.
             ['1403636579763555583.png', '1403636579763555584.png'],
             ['cam 2 left.png', 'cam 1 right.png'],
             ['photo.jpg', 'photo2.jpg'],
@@ -66,7 +66,7 @@ describe('inputs', () => {
         const names = [['pear.png', 'apple.png'], ['view.png', 'view.PNG'], ['01.png', '1.png']];
         for (const pair of names) {
             for (const order of [pair, [...pair].reverse()]) {
-                // Both files are the same, so that no pair is better than the other.
+                // Both files are the same, so that neither order is better.
                 const files = order.map((name) => ({ name, path: LEFT }));
                 assert.equal(await visit.changed(() => visit.give('dropped', files)), 'ready');
                 assert.deepEqual(await visit.names(), order);
@@ -84,7 +84,7 @@ describe('inputs', () => {
             assert.equal(await visit.changed(() => visit.give(way, [{ name: 'my left.png', path: LEFT }])), 'ready');
             assert.deepEqual(await visit.names(), ['my left.png', 'my right.png']);
             assert.equal(await visit.text('#pair-note'), '');
-            // The calibration was that of the pair before.
+            // The calibration belonged to the previous pair.
             await visit.says('#range-found', /by sparse matches$/);
         }
         await visit.match({ preset: 'fast', device: 'cpu', range: [0, 31] });
@@ -103,7 +103,7 @@ describe('inputs', () => {
         assert.equal(await visit.changed(() => visit.choose('right', at('new right.png'))), 'ready');
         assert.equal(await visit.text('#pair-note'), '');
         assert.match(await visit.text('#range-found'), /by sparse matches$/);
-        // A slot is obeyed, whatever the names say.
+        // A slot takes precedence over the names.
         await visit.changed(() => visit.give('dropped', [{ name: 'my right.png', path: LEFT }], 'left'));
         assert.deepEqual(await visit.names(), ['my right.png', 'new right.png']);
         await visit.changed(() => visit.give('dropped', [{ name: 'my left.png', path: RIGHT }], 'right'));
@@ -139,7 +139,7 @@ describe('inputs', () => {
             }
             assert.deepEqual([await visit.names(), await turn()], [['im0.png', 'im1.png'], before], `${words}`);
         }
-        // At its slot, where it has one.
+        // At its slot, if it was dropped on one.
         await visit.give('dropped', [notes], 'right');
         await visit.says('#right-problem', /notes is not an image/);
         assert.equal(await visit.tab.$eval('#app', (app) => app.dataset.state), 'done');
@@ -150,12 +150,12 @@ describe('inputs', () => {
     it('takes the views of folders', async () => {
         await visit.set({ range: 'automatic' });
         const [left, right, calib] = [[LEFT, 'b10.png'], [RIGHT, 'b9.png'], [join(scene('thin'), 'calib.txt'), 'calib.txt']].map(([path, name]) => ({ path, name }));
-        // In any order of a folder, with what systems leave there.
+        // In any order, with files that operating systems create.
         const files = [{ name: 'Thumbs.db', path: LEFT }, right, calib, { name: '.hidden.png', path: LEFT }, left];
         assert.equal(await visit.changed(() => visit.give('dropped', [{ folder: 'Some', files }])), 'ready');
         assert.deepEqual(await visit.names(), ['b9.png', 'b10.png']);
         await visit.says('#range-found', /by calib\.txt$/);
-        // Each view in a folder of its own, of one name.
+        // Each view in its own folder, with the same name.
         const two = [LEFT, RIGHT].map((path, i) => ({ folder: `image_${i}`, files: [{ name: '000010.png', path }] }));
         assert.equal(await visit.changed(() => visit.give('dropped', two)), 'ready');
         await visit.match({ preset: 'fast', device: 'cpu', range: [0, 31] });
@@ -186,7 +186,7 @@ describe('inputs', () => {
         await visit.match({ preset: 'fast', device: 'cpu', range: [-31, 0] });
         const swapped = native(RIGHT, LEFT, ['--method', 'fast', '--min-disparity', '-31', '--max-disparity', '0']);
         assert.equal(difference((await visit.save('pfm')).bytes, swapped.pfm), undefined);
-        // What is below 0 does not fit into PNG.
+        // Negative disparities do not fit into PNG.
         await visit.tab.click('#downloads [data-output=png]');
         await visit.says('#save-problem', /\w/);
         await works();
@@ -313,7 +313,7 @@ describe('inputs', () => {
 
     it('keeps no complaint of a range that was changed since', async () => {
         await visit.set({ range: [0, 20] });
-        // Faster than the engine answers.
+        // Before the engine replies.
         await visit.tab.evaluate(() => {
             const max = document.getElementById('max');
             for (const value of ['1000000', '-5', '', '20']) {
@@ -321,7 +321,7 @@ describe('inputs', () => {
                 max.dispatchEvent(new Event('change'));
             }
         });
-        // What was asked for before is answered by then.
+        // Earlier requests have been answered by then.
         await visit.match();
         assert.equal(await visit.text('#range-problem'), '');
         assert.match(await visit.text('#facts'), /range 0 to 20/);
@@ -329,7 +329,7 @@ describe('inputs', () => {
 
     it('goes on with another worker where one has ended', async () => {
         await visit.set({ range: 'automatic', device: 'cpu', preset: 'default' });
-        // The worker does not understand this, and ends with an error that nothing catches.
+        // This message makes the worker end with an uncaught error.
         await visit.tab.evaluate(() => {
             const post = Worker.prototype.postMessage;
             Worker.prototype.postMessage = function (message) {
@@ -340,7 +340,7 @@ describe('inputs', () => {
         await visit.tab.click('#match');
         await visit.says('#problem', /The engine ended .* started again/);
         await works();
-        // In the middle of a pair: who presses Match has it read again.
+        // In the middle of reading a pair: Match reads it again.
         await visit.tab.evaluate(() => {
             const post = Worker.prototype.postMessage;
             Worker.prototype.postMessage = function (message) {

@@ -1,4 +1,4 @@
-// What one does with a map for its looks: lengths, both views at once, the map before, meshes; and pairs by the camera.
+// Tools for viewing results: lengths, both views at once, the previous map, meshes; and pairs from the camera.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -12,7 +12,7 @@ import { BROWSER, Visit } from './lib/visit.mjs';
 
 const [WIDTH, HEIGHT] = [320, 240];
 const VIEWS = ['im0.png', 'im1.png'].map((file) => join(scene('mixed'), file));
-/** By the calib.txt of the scene. */
+/** From the calib.txt of the scene. */
 const [F, CX, CY, BASELINE] = [240, 159.5, 119.5, 0.18604166666666666];
 
 describe('looks', () => {
@@ -25,7 +25,7 @@ describe('looks', () => {
         return [((x - CX) * z) / F, ((y - CY) * z) / F, z];
     };
     const apart = (a, b) => Math.hypot(...place(a).map((value, i) => value - place(b)[i]));
-    /** The pixels of a canvas, RGBA. */
+    /** The RGBA pixels of a canvas. */
     const canvas = async (id) => Buffer.from(await visit.tab.evaluate((id) => {
         const { width, height } = document.getElementById(id);
         return [...document.getElementById(id).getContext('2d').getImageData(0, 0, width, height).data];
@@ -54,7 +54,7 @@ describe('looks', () => {
         const first = await length();
         assert.ok(Math.abs(first / apart([50, 100], [200, 130]) - 1) < 1e-4, `${first}`);
         assert.equal(await visit.tab.$eval('#ruler path', (path) => path.getAttribute('d')), 'M50.5 100.5L200.5 130.5');
-        // The third click begins anew. By keyboard: the point begins in the middle.
+        // The third click starts over. By keyboard, the point starts in the middle.
         await visit.tab.focus('#stage-box');
         await visit.tab.keyboard.press('ArrowRight');
         await visit.tab.keyboard.press('Enter');
@@ -66,7 +66,7 @@ describe('looks', () => {
         await visit.tab.keyboard.press('Enter');
         const second = await length();
         assert.ok(Math.abs(second / apart([161, 120], [161, 30]) - 1) < 1e-4, `${second}`);
-        // With another baseline it is another length.
+        // Another baseline gives another length.
         const baseline = (value) => visit.tab.$eval('#baseline', (input, value) => {
             input.value = value;
             input.dispatchEvent(new Event('change'));
@@ -94,7 +94,7 @@ describe('looks', () => {
             const grey = 0.299 * left[i] + 0.587 * left[i + 1] + 0.114 * left[i + 2];
             assert.ok(Math.abs(both[i] - grey) <= 1, `${i}`);
             const x = (i / 4) % WIDTH;
-            // The scale says its ends to a tenth.
+            // The scale rounds its ends to a tenth.
             if (x >= shift + 1) {
                 differing += [0, 4, -4].every((by) => both[i + 1] !== right[i - 4 * shift + by + 1]);
             }
@@ -106,7 +106,7 @@ describe('looks', () => {
             const { data } = document.getElementById('view').getContext('2d').getImageData(0, 0, 320, 240);
             return data.reduce((sum, value, i) => (sum + value * (i % 977)) % 1_000_003, 0);
         });
-        // As long as some turns take, however fast this machine looks.
+        // Long enough for several alternations.
         for (const end = Date.now() + 10_000; seen.size < 2 && Date.now() < end;) {
             seen.add(await hash());
         }
@@ -115,7 +115,7 @@ describe('looks', () => {
         assert.deepEqual(await canvas('view'), both);
         await visit.tab.click('#tab-disparity');
         await visit.tab.waitForSelector('#map[data-shown=disparity]');
-        // Nothing moves on.
+        // It has stopped.
         const still = await hash();
         await new Promise((resolve) => setTimeout(resolve, 500));
         assert.equal(await hash(), still);
@@ -130,7 +130,7 @@ describe('looks', () => {
         assert.deepEqual(await canvas('under'), left);
         await visit.tab.select('#behind', 'before');
         const under = await canvas('under');
-        // It is the map of the default, in the colours of the new one.
+        // The map of the default preset, in the colours of the new one.
         await visit.match({ preset: 'default' });
         assert.deepEqual(await option(), [false, 'Map before (fast)']);
         const [view, other] = [await canvas('view'), await canvas('under')];
@@ -169,9 +169,9 @@ describe('looks', () => {
             area += twice / 2;
         }
         assert.ok(Math.abs(least - 1) < 1e-3, `${least}`);
-        // Most of what is measured is covered, and edges are not.
+        // Most of the measured area is covered, but depth edges are not.
         assert.ok(area > 0.9 * count && area < 0.995 * count, `${area} of ${count}`);
-        // Where the pixel 100, 120 is.
+        // The vertex of pixel (100, 120).
         const index = trusted.slice(0, 120 * WIDTH + 100).reduce((sum, one) => sum + one, 0);
         assert.equal(trusted[120 * WIDTH + 100], 1);
         place([100, 120]).forEach((value, k) => assert.ok(Math.abs(at(index, k) - (k === 0 ? value : -value)) < 1e-4));
@@ -201,7 +201,7 @@ describe('looks', () => {
             await moment();
         };
         await shown('no-preference');
-        // By itself, for somebody who only looks.
+        // Starts by itself for a visitor who has not interacted.
         assert.equal(await other.$eval('#tab-points', (tab) => tab.getAttribute('aria-selected')), 'true');
         assert.equal(await other.$eval('#reset-view', (button) => button.textContent), 'Stop');
         const shift = await other.evaluate(() => new Promise((resolve) => {
@@ -222,7 +222,7 @@ describe('looks', () => {
         const still = await drawn();
         await moment();
         assert.equal(await drawn(), still);
-        // Under somebody's hand, the map stays.
+        // The map stays once the visitor has interacted.
         await other.emulateMediaFeatures([{ name: 'prefers-reduced-motion', value: 'no-preference' }]);
         await other.goto(visit.url);
         await other.waitForSelector('#outcome:not([hidden])');
@@ -234,7 +234,7 @@ describe('looks', () => {
     });
 
     it('says why there is no length where the cameras are a guess', async () => {
-        // Of another size: what was typed in holds for pairs of one size.
+        // Typed cameras are kept only for pairs of the same size.
         await visit.pair(scene('slanted'));
         await visit.match({ preset: 'fast' });
         assert.equal(await visit.tab.$eval('#behind option[value=before]', ({ disabled }) => disabled), true);
@@ -297,7 +297,7 @@ describe('a camera', () => {
         await visit.tab.click('#open-camera');
         await visit.tab.waitForSelector('#shoot:not([disabled])');
         assert.equal(await visit.text('#shoot'), 'Take the left view');
-        // Who clicks twice has not moved yet.
+        // A double click must not take both views.
         await visit.tab.evaluate(() => {
             document.getElementById('shoot').click();
             document.getElementById('shoot').click();

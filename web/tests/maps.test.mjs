@@ -1,4 +1,4 @@
-// The page's maps are the program's, bit for bit, by GPU and by CPU path.
+// The maps of the page are identical to those of the program, on GPU and CPU.
 import assert from 'node:assert/strict';
 import { cpSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -32,7 +32,7 @@ describe('maps', () => {
                         assert.equal(difference((await visit.save(output)).bytes, expected[output]), undefined, output);
                     }
                     assert.equal(difference((await visit.save('ply')).bytes, expected.points), undefined);
-                    // Control: one bit that is wrong is found, wherever it is.
+                    // Control: a flipped bit is detected anywhere in the file.
                     for (const at of [20, map.bytes.length >> 1, map.bytes.length - 1]) {
                         const flipped = Buffer.from(map.bytes);
                         flipped[at] ^= 1;

@@ -1,4 +1,4 @@
-// How much the first map loads, a match that is stopped, a browser without WebGPU, and a page without a network.
+// Download size of the first map, stopping a match, browsers without WebGPU, and offline use.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -48,7 +48,7 @@ describe('a match', () => {
     for (const device of ['gpu', 'cpu']) {
         it(`stops when it is told to, on the ${device}`, async () => {
             await visit.pair(scene('mixed'), CALIBRATION);
-            // One that takes a while on either path.
+            // A match that takes a while on either device.
             await visit.set({ device, preset: device === 'cpu' ? 'paper' : 'default', range: 'automatic' });
             await visit.begin();
             await visit.tab.click('#cancel');
@@ -69,12 +69,11 @@ describe('a match', () => {
                 }
             };
         });
-        // On a software driver this takes longer than the page waits, and not much: what the driver was given, it ends, and draws no page
-        // meanwhile.
+        // On a software driver this takes a little longer than the page waits: the driver finishes its queue, and draws no page meanwhile.
         await visit.set({ device: 'gpu', preset: 'paper', range: [0, 15] });
         await visit.begin();
         await visit.tab.click('#cancel');
-        // The map of the last match stays.
+        // The last map is kept.
         await visit.state('done');
         await visit.says('#problem', /^Stopped\.$/);
         await visit.match({ device: 'cpu', preset: 'default', range: 'automatic' });
@@ -138,7 +137,7 @@ describe('without a network', () => {
     const caches = (tab) => tab.evaluate(async () => (await window.caches.keys()).sort());
     before(async () => {
         visit = await Visit.open({
-            // What an earlier build has left, and a page in another folder of the host.
+            // Caches of an earlier build, and of a page in another folder of the host.
             before: async ({ tab, url }) => {
                 await tab.goto(`${url}icon.svg`);
                 const names = [`mrfgs ${url} 0123456789abcdef`, `mrfgs ${url}other/ 0123456789abcdef`];
@@ -161,17 +160,17 @@ describe('without a network', () => {
         await visit.host.stop();
         await visit.tab.reload();
         await visit.tab.waitForSelector('html[data-gpu]');
-        // The first view is there, too.
+        // The first view is available, too.
         assert.equal(await visit.settled(), 'done');
         await visit.set({ device: 'cpu' });
         assert.equal(await visit.scene('thin'), 'done');
         assert.equal(difference((await visit.save('pfm')).bytes, native(...views('thin')).pfm), undefined);
         await visit.tab.click('#tab-points');
-        // The chunk is there, and says so itself where the browser has no WebGL.
+        // The chunk is available, and reports a missing WebGL itself.
         await visit.says('#cloud-note', /[\d,]+ points|no WebGL 2/);
         await visit.tab.click('[data-scene=steep]');
         await visit.says('#pair-problem', /could not be loaded/);
-        // The browser tells of the scene that it could not fetch.
+        // The browser reports the scene that it could not fetch.
         visit.faults = visit.faults.filter((fault) => !/steep|ERR_|Failed to (load|fetch)|NetworkError/.test(fault));
     });
 });

@@ -1,4 +1,4 @@
-// The engine in a worker, for parity.mjs: matches a pair that the host has, and posts the files to it.
+// The engine in a worker, for parity.mjs: matches a pair from the host and posts the files back.
 import init, * as engine from '/engine/mrfgs_web.js';
 
 const ready = init({ module_or_path: new URL('/engine/mrfgs_web_bg.wasm', self.location.href) });

@@ -2,10 +2,10 @@
 //
 //   node web/tests/parity.mjs chromium|firefox PAIRDIR... [--presets default,paper,fgs,fast] [--paths gpu,cpu] [--flip]
 //
-// A pair is a folder with im0.png and im1.png; its calib.txt gives the range (ndisp), as `mrfgs match` takes it. It takes
-// target/web/engine, by scripts/web, and target/release/mrfgs. Each path and preset gives one line of JSON: the pixels of all pairs, in how
-// many of them any of the four maps differs (disparity, raw, confidence, validity), and the seconds that the browser took. The exit status
-// is 1 where pixels differ. --flip flips one bit of the first result, which must be counted as one pixel.
+// A pair is a folder with im0.png and im1.png; its calib.txt gives the range (ndisp), as for `mrfgs match`. Needs target/web/engine, built by
+// scripts/web, and target/release/mrfgs. Prints one line of JSON per path and preset: the number of pixels in all pairs, the number that
+// differ in any of the four maps (disparity, raw, confidence, validity), and the seconds in the browser. The exit status is 1 if pixels
+// differ. --flip flips one bit of the first result, which must be counted as one pixel.
 import { basename, dirname, join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
@@ -35,7 +35,7 @@ if (!installed(name)) {
 
 const OUTPUTS = ['pfm', 'raw', 'confidence', 'validity'];
 
-/** The bytes of each pixel of a map, however the file stores it. */
+/** The bytes of each pixel of a map, independent of the file format. */
 function pixels(output, file) {
     if (output === 'confidence' || output === 'validity') {
         const { width, height, levels: data } = levels(file);
@@ -45,7 +45,7 @@ function pixels(output, file) {
     return { width: Number(width), height: Number(height), bytes: 4, data: file.subarray(head.length) };
 }
 
-/** In how many pixels any of the outputs differs. */
+/** Number of pixels that differ in any of the outputs. */
 function differing(found, expected) {
     const differs = new Set();
     for (const output of OUTPUTS) {
@@ -60,7 +60,7 @@ function differing(found, expected) {
         for (let i = 0; i < a.data.length; i += 1) {
             if (a.data[i] !== b.data[i]) {
                 const at = Math.floor(i / a.bytes);
-                // PFM goes from the bottom row up, PNG from the top row down.
+                // PFM stores the bottom row first, PNG the top row.
                 const row = Math.floor(at / a.width);
                 differs.add(a.bytes === 4 ? (a.height - 1 - row) * a.width + (at % a.width) : at);
             }
@@ -72,7 +72,7 @@ function differing(found, expected) {
     return differs.size;
 }
 
-// What the browser computes comes back by POST: a protocol of text would take longer than a match.
+// Results come back by POST, as the text-based protocol of the browser would take longer than a match.
 const results = new Map();
 const receive = (request, response, key) => {
     const parts = [];

@@ -1,4 +1,4 @@
-// Pairs as people have them: in the formats of browsers, turned, in one image, in a folder.
+// Photos as users have them: in browser formats, rotated, in one image, in a folder.
 import assert from 'node:assert/strict';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -14,7 +14,7 @@ const { PNG } = createRequire(join(ROOT, 'web/package.json'))('pngjs');
 const VIEWS = ['im0.png', 'im1.png'].map((file) => join(scene('mixed'), file));
 const RANGE = [0, 47];
 
-/** JPEG with the tag Orientation of EXIF. */
+/** Adds the EXIF tag Orientation to a JPEG. */
 function turned(jpeg, orientation) {
     const tiff = Buffer.from('4d4d002a00000008000101120003000000010000000000000000', 'hex');
     tiff.writeUInt16BE(orientation, 18);
@@ -44,7 +44,7 @@ describe('photos', () => {
         await visit.match({ preset: 'fast', device: 'cpu', range: RANGE });
         return (await visit.save('pfm')).bytes;
     };
-    /** A view in another format, by the browser; undefined where it writes none of these. */
+    /** Converts a view to another format with the browser; undefined if it does not write that format. */
     const recoded = async (path, type, turn = false) => {
         const found = await visit.tab.evaluate(async (content, type, turn) => {
             const bytes = Uint8Array.from(atob(content), (c) => c.charCodeAt(0));
@@ -86,7 +86,7 @@ describe('photos', () => {
     });
 
     it('takes what the browser decodes: AVIF and GIF', async () => {
-        // A part of each view, which Pillow has compressed.
+        // A crop of each view, compressed by Pillow.
         const [left, top, width, height] = [60, 40, 160, 120];
         for (const [i, path] of VIEWS.entries()) {
             const part = new PNG({ width, height });
@@ -107,7 +107,7 @@ describe('photos', () => {
 
     it('turns photos upright', async () => {
         for (const [i, path] of VIEWS.entries()) {
-            // Stored a quarter to the left, with the tag that says so.
+            // Stored rotated by a quarter turn, with the matching tag.
             writeFileSync(at(`turned${i}.jpg`), turned(await recoded(path, 'image/jpeg', true), 6));
         }
         const files = ['turned0.jpg', 'turned1.jpg'].map(at);
@@ -131,7 +131,7 @@ describe('photos', () => {
         assert.equal(await visit.changed(() => visit.choose('left', at('stack.png'))), 'ready');
         await visit.says('#pair-note', /upper half/);
         assert.equal(difference(await matches(), expected.pfm), undefined);
-        // Wide views above each other make no high image: halves that are alike enough are cut in any shape.
+        // Wide views on top of each other are not portrait; similar halves are split in any shape.
         const wide = new PNG({ width: 240, height: 2 * 67 });
         ['im0.png', 'im1.png'].forEach((file, i) => {
             PNG.bitblt(PNG.sync.read(readFileSync(join(scene('border'), file))), wide, 0, 0, 240, 67, 0, 67 * i);
@@ -139,7 +139,7 @@ describe('photos', () => {
         writeFileSync(at('wide.png'), PNG.sync.write(wide));
         assert.equal(await visit.changed(() => visit.choose('left', at('wide.png'))), 'ready');
         await visit.says('#pair-note', /upper half/);
-        // One view alone is left as it is, and a button cuts it.
+        // A single view is left as it is, and a button splits it.
         await visit.scene('thin');
         assert.equal(await visit.changed(() => visit.choose('left', VIEWS[0])), 'empty');
         assert.equal(await visit.changed(() => visit.tab.click('#cut-above')), 'ready');
@@ -169,7 +169,7 @@ describe('photos', () => {
         await visit.state('done');
         const size = () => visit.tab.$eval('#size', (select) => select.value);
         assert.equal(await size(), 'full');
-        // It was for that pair.
+        // The setting applied to that pair only.
         assert.equal(await visit.changed(() => visit.choose('left', ...VIEWS)), 'ready');
         assert.equal(await size(), 'automatic');
     });

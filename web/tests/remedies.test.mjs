@@ -1,4 +1,4 @@
-// What the page says of a result, and what helps: it stays with the result, and a button does it.
+// Warnings about a result and their remedies: they stay with the result, and a button applies them.
 import assert from 'node:assert/strict';
 import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -58,7 +58,7 @@ describe('remedies', () => {
     const click = (list, text) => visit.tab.evaluate((list, text) => {
         [...document.querySelectorAll(`${list} button`)].find((button) => button.textContent === text).click();
     }, list, text);
-    /** Does what matches again, and waits for it. */
+    /** Runs an action that matches again, and waits for the result. */
     const again = async (action) => {
         const before = await visit.tab.$eval('#app', (app) => app.dataset.took);
         await action();
@@ -105,7 +105,7 @@ describe('remedies', () => {
         await visit.set({ range: 'automatic' });
         const [left, right] = views('mixed');
         const from = PNG.sync.read(readFileSync(right));
-        // As if the camera had been turned down between the views.
+        // Simulates a camera that was tilted between the views.
         const to = new PNG({ width: from.width, height: from.height });
         PNG.bitblt(from, to, 0, 60, from.width, from.height - 60, 0, 0);
         const [one, other] = ['by hand left.png', 'by hand right.png'].map((name) => join(folder, name));
@@ -114,7 +114,7 @@ describe('remedies', () => {
         assert.equal(await visit.changed(() => visit.choose('left', one, other)), 'ready');
         await visit.says('#range-problem', /^Sparse matches find no range/);
         await visit.says('#no-range', /by hand/);
-        // Who presses Match is led there.
+        // Match leads to the button.
         await visit.tab.click('#match');
         await visit.tab.waitForFunction(() => document.activeElement.id === 'rectify');
         await again(() => visit.tab.click('#rectify'));
@@ -122,10 +122,10 @@ describe('remedies', () => {
         assert.equal(await visit.tab.$eval('#no-range', (offer) => offer.checkVisibility()), false);
         assert.equal(await visit.text('#range-problem'), '');
         assert.equal(difference((await visit.save('pfm')).bytes, native(one, other, [...FAST, '--rectify']).pfm), undefined);
-        // The same pair stays rectified.
+        // The same pair remains rectified.
         await visit.changed(() => visit.tab.click('#swap'));
         assert.match(await visit.text('#notes'), /Rectified by its own matches/);
-        // Another pair is not.
+        // Another pair is not rectified.
         await visit.pair(scene('mixed'));
         assert.equal(await visit.text('#notes'), '');
     });
@@ -144,11 +144,11 @@ describe('remedies', () => {
         await visit.set({ range: 'automatic' });
         await visit.says('#range-problem', /find no range/);
         assert.equal(await visit.tab.$eval('#no-range', (offer) => offer.checkVisibility()), false);
-        // It was about that pair.
+        // The failure concerned that pair.
         assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'ready');
         assert.equal(await visit.text('#pair-problem'), '');
         assert.ok((await offered()).includes('Rectify'));
-        // Where the range is known, too. The engine is given what it cannot rectify by.
+        // Also with a known range. The engine is given a pair that it cannot rectify.
         await visit.set({ range: [0, 31] });
         await visit.tab.evaluate(() => {
             const real = Worker.prototype.postMessage;
@@ -230,11 +230,11 @@ describe('remedies', () => {
         assert.equal(await visit.scene('mixed'), 'done');
         await visit.choose('left', join(scene('thin'), 'calib.txt'));
         await visit.says('#pair-note', /calib\.txt is kept/);
-        // A scene has its own.
+        // A scene has its own calibration.
         assert.equal(await visit.scene('slanted'), 'done');
         await visit.pair(scene('thin'));
         await visit.says('#range-found', /^0 to 31 px, by calib\.txt$/);
-        // It is of that pair, and not of the next one.
+        // It belongs to that pair, not to the next one.
         await visit.pair(scene('slanted'));
         await visit.says('#range-found', /by sparse matches$/);
     });
@@ -245,7 +245,7 @@ describe('remedies', () => {
         await visit.says('#warnings', /cuts off part of the scene/);
         await again(() => click('#warnings', 'Widen the range'));
         assert.match(await visit.text('#facts'), /range 0 to 29/);
-        // Also while another match runs, which ends. The range holds for this pair.
+        // Also during another match, which is stopped. The range is kept for this pair.
         await visit.match({ range: [0, 19] });
         await visit.set({ preset: 'paper' });
         await visit.begin();
@@ -306,7 +306,7 @@ describe('remedies', () => {
             assert.ok(texts.some((text) => /^Matching · \d+ %/.test(text)), texts.join('; '));
             assert.ok(texts.every((text) => /^(Getting ready|(Preparing the views|Matching|Cleaning up) · \d+ %( · .* left)?)$/.test(text)), texts.join('; '));
             const half = seen.findLast(({ time }) => time < end / 2);
-            // Firefox says at once that a device is done.
+            // Firefox reports immediately that a device is done.
             if (device === 'cpu' || BROWSER === 'chromium') {
                 assert.ok((half?.done ?? 0) < 0.9, `half of the time: ${JSON.stringify(half)}`);
             }

@@ -1,4 +1,4 @@
-// Runs all tests in the browser that is named, or in all that are installed.
+// Runs all tests in the named browser, or in all installed ones.
 import { spawnSync } from 'node:child_process';
 import { readdirSync } from 'node:fs';
 import { dirname, join } from 'node:path';
@@ -19,7 +19,7 @@ for (const name of named ? [named] : ['chromium', 'firefox']) {
     }
     const { stdout } = spawnSync(path, ['--version'], { encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] });
     console.log(`${name}: ${stdout.trim()}`);
-    // One after the other: software drivers take all cores.
+    // Sequentially, as software drivers use all cores.
     const { status } = spawnSync(process.execPath, ['--test', '--test-concurrency=1', '--test-reporter=spec', ...tests], {
         stdio: 'inherit',
         env: { ...process.env, MRFGS_BROWSER: name },

@@ -1,4 +1,4 @@
-// What comes while something else is under way: names, map, range and files are always those of one pair.
+// Overlapping actions: names, map, range and files must always belong to the same pair.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { after, before, describe, it } from 'node:test';
@@ -12,7 +12,7 @@ const THIN = named(views('thin'), 'my left.png', 'my right.png');
 const RAW = named(['left.png', 'right.png', 'cameras.yml'].map((file) => join(scene('raw'), file)), 'raw left.png', 'raw right.png', 'cameras.yml');
 const FAST = ['--method', 'fast'];
 const RANGE = ['--max-disparity', '31'];
-/** Longer than the page waits for a worker that is to stop. */
+/** Longer than the page waits for a worker to stop. */
 const PATIENCE = 3000;
 
 describe('turns', () => {
@@ -21,7 +21,7 @@ describe('turns', () => {
     const idle = (time) => new Promise((resolve) => setTimeout(resolve, time));
     const paste = (...files) => visit.give('pasted', files);
     const drop = (...files) => visit.give('dropped', files);
-    /** The page holds the pair of `thin` under these names, and gives its map under the first one. */
+    /** The page holds the pair `thin` under these names, and saves its map under the first one. */
     async function holds(...names) {
         assert.deepEqual(await visit.names(), names);
         assert.equal(await visit.text('#notes'), '');
@@ -56,7 +56,7 @@ describe('turns', () => {
             const state = await visit.changed(async () => {
                 await drop(...THIN);
                 await act();
-                // Until then the page is that of the scene, with its names and its map.
+                // Until then the page shows the scene, with its names and its map.
                 assert.deepEqual(await visit.names(), ['mixed im0.png', 'mixed im1.png']);
                 assert.equal((await visit.save('pfm')).name, 'mixed-disparity.pfm');
                 await visit.release();
@@ -99,7 +99,7 @@ describe('turns', () => {
         await visit.tab.waitForFunction(() => document.querySelector('#left .name').textContent === 'my left.png');
         await visit.state('ready');
         await holds('my left.png', 'my right.png');
-        // A scene that is still on its way.
+        // A scene that is still loading.
         await visit.tab.evaluate(() => {
             const real = window.fetch;
             const held = new Promise((resolve) => (window.release = resolve));
@@ -117,7 +117,7 @@ describe('turns', () => {
     });
 
     for (const call of ['pair', 'calibration', 'rectify', 'range', 'warnings']) {
-        /** Gives a pair that is rectified by its calibration, and stays at the call. */
+        /** Gives a pair that is rectified by its calibration, and holds the call. */
         const hold = async () => {
             await visit.set({ range: 'automatic' });
             await visit.holdCalls(call);
@@ -135,7 +135,7 @@ describe('turns', () => {
                 const state = await visit.changed(async () => {
                     await drop(...THIN);
                     await visit.tab.waitForFunction(() => document.querySelector('#left .name').textContent === 'my left.png');
-                    // The page ends a worker that it waits for in vain.
+                    // The page replaces a worker that does not reply.
                     await idle(end === 'never answered' ? PATIENCE : 0);
                     await visit.release();
                 });
@@ -185,14 +185,14 @@ describe('turns', () => {
         await visit.scene('mixed');
         await visit.holdCalls('points');
         await visit.tab.click('#tab-points');
-        // A browser without WebGL asks for none, and says so.
+        // A browser without WebGL requests no points and reports that.
         await visit.tab.waitForFunction(() => window.held === 'points' || /no WebGL/.test(document.getElementById('cloud-note').textContent));
         await visit.changed(async () => {
             await drop(...THIN);
             await visit.release();
         });
         await idle(300);
-        // The slider would end where a cloud ends.
+        // The slider would be limited by the cloud.
         const shown = await visit.tab.evaluate(() => [document.getElementById('points').dataset.points, document.getElementById('least').max]);
         assert.deepEqual(shown, ['', '255']);
         await visit.says('#cloud-note', /next result/);
@@ -204,7 +204,7 @@ describe('turns', () => {
         await visit.scene('mixed');
         await visit.set({ preset: 'paper' });
         await visit.begin();
-        // Two changes at once, while the match is being ended.
+        // Two changes at once, while the match is being stopped.
         await visit.changed(() => visit.tab.evaluate(() => {
             document.getElementById('swap').click();
             document.getElementById('swap').click();
@@ -223,7 +223,7 @@ describe('a page that opens', () => {
     after(() => visit.close());
 
     it('leaves the first scene to whom is faster, and waits for a GPU that takes its time', async () => {
-        // What the page gives the worker, and what it reads, is held from the beginning.
+        // Holds messages to the worker and file reads from the start.
         await visit.tab.evaluateOnNewDocument(() => {
             const { postMessage } = Worker.prototype;
             const { arrayBuffer } = Blob.prototype;
@@ -251,7 +251,7 @@ describe('a page that opens', () => {
         await visit.changed(() => visit.tab.evaluate(() => window.read()));
         assert.deepEqual(await visit.names(), ['my left.png', 'my right.png']);
         await visit.state('ready');
-        // The pair changes while the GPU is opened.
+        // The pair changes while the GPU is being opened.
         await visit.changed(() => visit.tab.click('#swap'));
         await new Promise((resolve) => setTimeout(resolve, PATIENCE));
         assert.deepEqual(await visit.names(), ['my right.png', 'my left.png']);

@@ -1,4 +1,4 @@
-// What is shown of a result, with mouse and keyboard, on wide and narrow screens.
+// Views of a result with mouse and keyboard, on wide and narrow screens.
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
@@ -32,12 +32,12 @@ describe('views', () => {
         await visit.tab.click('#zoom-one');
         for (const [x, y] of [[0, 0], [319, 239], [100, 150], [3, 120]]) {
             const box = await visit.tab.$eval('#sheet', (sheet) => ({ x: sheet.getBoundingClientRect().x, y: sheet.getBoundingClientRect().y }));
-            // Whole numbers, which every browser takes as they are.
+            // Integers, which all browsers treat alike.
             await visit.tab.mouse.move(Math.ceil(box.x + x), Math.ceil(box.y + y));
             const said = await visit.says('#readout', new RegExp(`^x ${x}, y ${y} `));
             assert.match(said, new RegExp(`disparity ${map.at(x, y).toFixed(2)} px · confidence ${confidence[y * 320 + x]} `));
             assert.equal(/measured/.test(said), validity[y * 320 + x] === 0, said);
-            // Z = baseline * f / d, by the calib.txt.
+            // Z = baseline * f / d, from the calib.txt.
             const depth = Number(said.match(/depth ([\d.]+) m$/)[1]);
             assert.ok(Math.abs(depth / ((0.18604166666666666 * 240) / map.at(x, y)) - 1) < 1e-4, said);
         }
@@ -96,7 +96,7 @@ describe('views', () => {
         assert.ok((await visit.text('#legend')).includes(share), `${share}: ${await visit.text('#legend')}`);
         await visit.tab.click('#tab-disparity');
         await shown('disparity');
-        // Nearly all that was measured is between the ends of the colours.
+        // Nearly all measured disparities are between the ends of the colours.
         const map = disparities(expected.pfm);
         const reasons = levels(expected.validity).levels;
         const measured = [...reasons.keys()].filter((i) => reasons[i] === 0).map((i) => map.at(i % 320, Math.floor(i / 320))).sort((a, b) => a - b);
@@ -119,7 +119,7 @@ describe('views', () => {
         const count = Number(expected.points.toString('latin1', 0, 400).match(/element vertex (\d+)/)[1]);
         assert.equal(await points(), count);
         const picture = async () => {
-            // Without the ring of the focus. What was asked for is drawn in the next frame.
+            // Without the focus ring. Requested changes are drawn in the next frame.
             await visit.tab.evaluate(() => {
                 document.activeElement.blur();
                 return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
@@ -170,7 +170,7 @@ describe('views', () => {
 
     it('works by keyboard alone', async () => {
         await visit.tab.focus('#left-file');
-        // The focus is shown to those who use the keyboard.
+        // The focus is visible to keyboard users.
         await visit.tab.keyboard.press('Tab');
         await visit.tab.keyboard.down('Shift');
         await visit.tab.keyboard.press('Tab');
@@ -178,7 +178,7 @@ describe('views', () => {
         const order = [];
         for (let i = 0; i < 20; i += 1) {
             order.push(await focused());
-            // Where the focus is, is seen.
+            // The focused element is marked visibly.
             const outlined = await visit.tab.evaluate(() => {
                 const element = document.activeElement;
                 const outlined = element.type === 'file' ? element.nextElementSibling.querySelector('.thumb') : element;
@@ -270,7 +270,7 @@ describe('views', () => {
         const height = await visit.tab.$eval('#stage-box', (box) => box.getBoundingClientRect().height);
         assert.ok(height > 500, `${height}`);
         if (BROWSER === 'chromium') {
-            // Firefox shows paper on no demand.
+            // Firefox cannot emulate print.
             await visit.tab.emulateMediaType('print');
             const seen = await visit.tab.evaluate(() => ['form', 'map', 'scale'].map((id) => document.getElementById(id).checkVisibility()));
             await visit.tab.emulateMediaType(null);
@@ -284,7 +284,7 @@ describe('views', () => {
         await other.goto(visit.url);
         await other.waitForSelector('html[data-gpu]');
         const folder = mkdtempSync(join(tmpdir(), 'mrfgs-thumbs-'));
-        // Twelve bits of a camera in 16, taller than wide.
+        // A portrait image with 12 of 16 bits used.
         const [width, height] = [60, 120];
         const grey = Buffer.alloc(2 * width * height);
         for (let i = 0; i < width * height; i += 1) {
@@ -314,7 +314,7 @@ describe('views', () => {
 
     it('has nothing that axe finds fault with', { skip: BROWSER !== 'chromium' && 'it is the same page in all browsers' }, async () => {
         const other = await visit.browser.newPage();
-        // The policy of the page lets no other script in.
+        // The Content-Security-Policy of the page allows no other script.
         await other.setBypassCSP(true);
         await other.goto(visit.url);
         await other.waitForSelector('html[data-gpu]');

@@ -1,14 +1,14 @@
-//! The cameras of a rectified pair, where no file says them.
+//! The cameras of a rectified pair, given on the command line.
 
 use std::str::FromStr;
 
 use mrfgs::image::calib::{Calibration, Camera, Unit};
 
-/// The cameras of a rectified pair, in the place of a calibration.
+/// Flags that give the cameras of a rectified pair in place of a calibration file.
 #[derive(clap::Args, Clone, Copy)]
 pub(crate) struct CameraArgs {
-    /// Focal length of the rectified pair in pixels; with --baseline it takes the place of --calib for depth and points. The
-    /// principal point is the centre of the image
+    /// Focal length of the rectified pair in pixels. With --baseline it replaces --calib for depth and points; the principal point is then
+    /// the centre of the image
     #[arg(
         long,
         value_name = "PIXELS",
@@ -18,7 +18,7 @@ pub(crate) struct CameraArgs {
         value_parser = focal_length
     )]
     focal: Option<f64>,
-    /// Distance of the cameras, with --focal: 120mm, 12cm, 0.12m, or a number alone, whose unit is then that of all depths
+    /// Distance between the cameras, with --focal: 120mm, 12cm, 0.12m, or a bare number, whose unit then applies to all depths
     #[arg(
         long,
         value_name = "LENGTH",
@@ -31,19 +31,19 @@ pub(crate) struct CameraArgs {
 }
 
 impl CameraArgs {
-    /// The calibration of images of this size, where it is given by its numbers.
+    /// The calibration of images of `size` (width, height); `None` without these flags.
     pub(crate) fn calibration(&self, size: (usize, usize)) -> Option<Calibration> {
         let (focal, Baseline { length, unit }) = self.focal.zip(self.baseline)?;
         Some(Calibration::of_cameras(Camera::centred(focal, size), length, unit))
     }
 
-    /// The flag that gives them, where it is there.
+    /// The name of the flag if it was given, for messages.
     pub(crate) fn flag(&self) -> Option<&'static str> {
         self.focal.map(|_| "--focal")
     }
 }
 
-/// The distance of two cameras.
+/// The distance between the two cameras.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Baseline {
     length: f64,
@@ -54,7 +54,7 @@ impl FromStr for Baseline {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        // What ends in mm ends in m, too.
+        // Millimetres and centimetres come first because their names also end in "m".
         let units = [Unit::Millimetre, Unit::Centimetre, Unit::Metre];
         let with_unit = units.into_iter().find_map(|unit| Some((text.strip_suffix(unit.name())?, unit)));
         let (number, unit) = with_unit.unwrap_or((text, Unit::Unknown));

@@ -6,19 +6,18 @@ use mrfgs::options::{Method, PRESETS, Preset, mebibytes};
 
 use crate::failure::{Failure, Result};
 
-/// The parameters that determine the result.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Method")]
 pub(crate) struct MethodArgs {
-    /// A preset, or a TOML file whose keys replace those of the preset; `mrfgs presets` lists presets and keys. Given
-    /// several times, a later file replaces keys of an earlier one [default: default]
+    /// A preset, or a TOML file that overrides keys of the preset; `mrfgs presets` lists both. May be repeated: later files override
+    /// earlier ones [default: default]
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) method: Vec<PathBuf>,
-    /// Sets one key, after --method: `--set levels=4 --set matching=sad`
+    /// Sets one option, after --method: `--set levels=4 --set matching=sad`
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
     pub(crate) set: Vec<(String, String)>,
-    /// Memory that a match may take, such as 2GiB or 512MiB. A pair that needs more is matched tile by tile, which changes
-    /// some bits of the result [default: 4GiB, the preset's]
+    /// Memory limit of a match, such as 2GiB or 512MiB. A pair that needs more is matched tile by tile, which changes the result slightly
+    /// [default: 4GiB, set by the preset]
     #[arg(long, value_name = "SIZE", value_parser = mebibytes)]
     pub(crate) memory: Option<u32>,
 }
@@ -26,11 +25,11 @@ pub(crate) struct MethodArgs {
 fn key_and_value(text: &str) -> std::result::Result<(String, String), String> {
     match text.split_once('=') {
         Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().into(), value.trim().into())),
-        _ => Err("give a key and its value, like levels=4".into()),
+        _ => Err("give a key and a value, such as levels=4".into()),
     }
 }
 
-/// The preset that `--method` names, if it names one.
+/// The preset called `word`, if there is one.
 fn preset(word: &Path) -> Option<&'static Preset> {
     PRESETS.iter().find(|preset| word == Path::new(preset.name))
 }
@@ -41,14 +40,15 @@ impl MethodArgs {
         self.on("default")
     }
 
-    /// The same; without a preset in `--method` the files change the preset `base`.
+    /// Like [`Self::method`], but based on the preset `base` if `--method` names none.
     pub(crate) fn on(&self, base: &str) -> Result<Method> {
         let mut method = Method::preset(base)?;
         for (i, word) in self.method.iter().enumerate() {
             if let Some(preset) = preset(word) {
                 if i > 0 {
                     let name = preset.name;
-                    let reason = format!("the preset {name} would replace all keys before it; give it first");
+                    let reason =
+                        format!("the preset {name} would override everything before it; put it first");
                     return Err(Failure::usage("--method", reason));
                 }
                 method = preset.method();
@@ -57,7 +57,7 @@ impl MethodArgs {
             } else {
                 let names: Vec<_> = PRESETS.iter().map(|preset| preset.name).collect();
                 let reason = format!(
-                    "there is no preset `{}`, and no such file; give one of {}, or a TOML file",
+                    "`{}` is neither a preset nor a file; give one of {}, or a TOML file",
                     word.display(),
                     names.join(", ")
                 );
@@ -69,12 +69,12 @@ impl MethodArgs {
         Ok(method.validated()?)
     }
 
-    /// The files that `--method` names.
+    /// The files among the arguments of `--method`.
     pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
         self.method.iter().map(PathBuf::as_path).filter(|word| preset(word).is_none())
     }
 
-    /// What the method is called: the words of `--method`.
+    /// The arguments of `--method`, joined by " + "; `None` without any.
     pub(crate) fn name(&self) -> Option<String> {
         let words: Vec<_> = self.method.iter().map(|word| word.display().to_string()).collect();
         (!words.is_empty()).then(|| words.join(" + "))

@@ -17,5 +17,5 @@ pub(crate) use reading::{ReadingArgs, disparity, scale};
 pub(crate) use recording::{RecordingArgs, Topics, nanoseconds};
 pub(crate) use rectification::{RectificationArgs, shown};
 pub(crate) use region::{CropArgs, RegionArgs};
-pub(crate) use search::{Found, Search, calibrated_range, depth};
+pub(crate) use search::{ResolvedRange, Search, calibrated_range, depth};
 pub(crate) use sign::Sign;

@@ -1,20 +1,18 @@
-//! Which images of a recording are pairs.
+//! Which images of a recording form pairs.
 
 use std::str::FromStr;
 
-/// Which images of a recording are pairs.
 #[derive(clap::Args, Clone)]
 pub(crate) struct RecordingArgs {
-    /// Topics of the left and of the right images of a recording, such as `/left/image_raw,/right/image_raw` [default: by
-    /// their names]
+    /// Topics of the left and right images of a recording, such as `/left/image_raw,/right/image_raw` [default: guessed from their names]
     #[arg(long, value_name = "LEFT,RIGHT")]
     pub(crate) topics: Option<Topics>,
-    /// How far the times of two images of a recording may be apart that are a pair, in seconds [default: 0]
+    /// Maximum difference in time between the two images of a pair, in seconds [default: 0]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = nanoseconds)]
     pub(crate) tolerance: Option<u64>,
 }
 
-/// The names of two topics, left and right.
+/// The names of the left and the right topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Topics(pub(crate) [String; 2]);
 
@@ -27,12 +25,15 @@ impl FromStr for Topics {
             [left, right] if left != right && !left.is_empty() && !right.is_empty() => {
                 Ok(Self([left, right].map(str::to_owned)))
             }
-            _ => Err("give the topic of the left and of the right images, such as /left/image_raw,/right/image_raw".into()),
+            _ => {
+                Err("give the topics of the left and right images, such as /left/image_raw,/right/image_raw"
+                    .into())
+            }
         }
     }
 }
 
-/// Seconds as nanoseconds.
+/// Parses seconds, 0 to 3600, into nanoseconds.
 pub(crate) fn nanoseconds(text: &str) -> Result<u64, String> {
     let seconds = text.parse().ok().filter(|seconds: &f64| (0.0..=3600.0).contains(seconds));
     let seconds = seconds.ok_or("give a number of seconds from 0 to 3600")?;

@@ -7,12 +7,11 @@ use serde::Serialize;
 
 use crate::failure::{Failure, Result};
 
-/// The calibration that rectifies, and how.
+/// Flags of a rectification.
 #[derive(clap::Args, Serialize)]
 pub(crate) struct RectificationArgs {
-    /// How much to show, from 0 (only pixels that have a source) to 1 (all pixels of the images). Without it
-    /// the rectification is that of the calibration if it has one, else one that keeps the focal length
-    /// (fisheyes: 0)
+    /// How much of the images to keep when rectifying, from 0 (no empty borders) to 1 (all pixels). Default: the rectification stored in
+    /// the calibration, else one that keeps the focal length (fisheyes: 0)
     #[arg(long, value_name = "0..1", allow_negative_numbers = true, value_parser = alpha)]
     pub(crate) alpha: Option<f64>,
 }
@@ -22,10 +21,10 @@ impl RectificationArgs {
         Options { alpha: self.alpha, ..Options::default() }
     }
 
-    /// The options where images are to be rectified. Else they take none.
+    /// The options if images are rectified, else `None`; refuses --alpha without a rectification.
     pub(crate) fn options_if(&self, rectifies: bool) -> Result<Option<Options>> {
         if self.alpha.is_some() && !rectifies {
-            let reason = "is of a rectification; add --rectify, or leave --alpha out";
+            let reason = "needs a rectification; add --rectify, or remove --alpha";
             return Err(Failure::usage("--alpha", reason));
         }
         Ok(rectifies.then(|| self.options()))
@@ -37,7 +36,7 @@ fn alpha(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "give a number from 0 to 1".into())
 }
 
-/// The files of a calibration, as messages name them.
+/// The paths of calibration files, for messages.
 pub(crate) fn shown(files: &[PathBuf]) -> String {
     files.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
 }

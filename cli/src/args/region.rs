@@ -1,4 +1,4 @@
-//! A region of the left view, and a part of what was calibrated.
+//! A region of the left view, and the crop of the calibrated images.
 
 use mrfgs::image::Rect;
 use serde::{Serialize, Serializer};
@@ -6,23 +6,23 @@ use serde::{Serialize, Serializer};
 /// The region to match.
 #[derive(clap::Args)]
 pub(crate) struct RegionArgs {
-    /// Matches this part of LEFT alone, its first column and row, width and height in pixels: all outputs are of that part. It takes
-    /// the time of the part, its range and 32 pixels around
+    /// Matches only this region of LEFT: first column, first row, width and height in pixels. All outputs cover that region, and the time
+    /// falls with it
     #[arg(long, value_name = "X,Y,W,H", value_parser = region)]
     pub(crate) roi: Option<Rect>,
 }
 
-/// The part that the images are of.
+/// The crop that the input images show.
 #[derive(clap::Args, Default, Serialize)]
 pub(crate) struct CropArgs {
-    /// The part of the calibrated images that the images show, as it is or scaled: its first column and row, width and height in
-    /// pixels [default: all of them, or for OAK cameras their middle]
+    /// The crop of the calibrated images that your images show, possibly scaled: first column, first row, width and height in pixels
+    /// [default: all, or the centre for OAK cameras]
     #[arg(long, value_name = "X,Y,W,H", value_parser = region, requires = "calib")]
     #[serde(serialize_with = "as_given", skip_serializing_if = "Option::is_none")]
     pub(crate) calib_crop: Option<Rect>,
 }
 
-/// First column and row, width and height.
+/// Serializes a region as it is given: first column, first row, width and height.
 #[allow(clippy::ref_option, reason = "serde hands it over so")]
 fn as_given<S: Serializer>(part: &Option<Rect>, serializer: S) -> Result<S::Ok, S::Error> {
     part.as_ref().map(|part| [part.x.start, part.y.start, part.x.len(), part.y.len()]).serialize(serializer)

@@ -1,4 +1,4 @@
-//! The disparities to search: as the user says, by a calibration, or by sparse matches.
+//! The disparity range to search: given by the user, by a calibration, or estimated from sparse matches.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -14,13 +14,13 @@ use crate::args::cameras::above_zero;
 use crate::args::sign::Sign;
 use crate::failure::{self, Failure, Result};
 
-/// The largest disparity to search, as users give it: a number of pixels, or `auto`.
+/// The value of `--max-disparity`: a number of pixels, or `auto`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Largest {
-    /// The range is that of sparse matches.
+    /// Estimate the range from sparse matches.
     Auto,
-    /// So many pixels, within [`MAX_DISPARITY`] of 0.
+    /// A number of pixels within ±[`MAX_DISPARITY`].
     #[serde(untagged)]
     Pixels(i32),
 }
@@ -33,37 +33,37 @@ impl FromStr for Largest {
     }
 }
 
-/// A disparity, in pixels, as users give it.
+/// Parses a disparity in pixels.
 ///
 /// # Errors
-/// What to give instead, for anything but a whole number within [`MAX_DISPARITY`] of 0.
+/// A message with the accepted values, for anything but an integer within ±[`MAX_DISPARITY`].
 pub fn pixels(text: &str) -> std::result::Result<i32, String> {
     let reach = -MAX_DISPARITY..=MAX_DISPARITY;
     let number = text.parse().ok().filter(|number| reach.contains(number));
     number.ok_or_else(|| format!("give a whole number of pixels within {MAX_DISPARITY} of 0"))
 }
 
-/// What the user says of the range.
+/// Flags of the disparity range.
 #[derive(clap::Args, Clone, Copy, Default, Serialize)]
 pub(crate) struct Search {
-    /// Largest disparity to search, in pixels, itself included; `auto` takes the range from sparse matches [default: ndisp
-    /// - 1 of the calibration file, or auto without one]
+    /// Largest disparity to search, in pixels, inclusive; `auto` estimates the range from the images [default: ndisp - 1 of the calibration
+    /// file, or auto without one]
     #[arg(long, value_name = "N|auto", allow_negative_numbers = true, value_parser = str::parse::<Largest>)]
     pub(crate) max_disparity: Option<Largest>,
-    /// Smallest disparity to search, in pixels; may be negative [default: 0, or that of the range found]
+    /// Smallest disparity to search, in pixels; may be negative [default: 0, or the estimated one]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = pixels)]
     pub(crate) min_disparity: Option<i32>,
-    /// Nearest depth to search, in the unit of the baseline, in the place of --max-disparity. It takes the cameras of a calibration
+    /// Nearest depth to search, in the unit of the baseline, instead of --max-disparity. Needs a calibration
     #[arg(long, value_name = "Z", allow_negative_numbers = true, conflicts_with = "max_disparity", value_parser = depth)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) min_depth: Option<f64>,
-    /// Farthest depth to search, in the place of --min-disparity
+    /// Farthest depth to search, instead of --min-disparity
     #[arg(long, value_name = "Z", allow_negative_numbers = true, conflicts_with = "min_disparity", value_parser = depth)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) max_depth: Option<f64>,
 }
 
-/// A depth, as users give it.
+/// Parses a depth.
 pub(crate) fn depth(text: &str) -> std::result::Result<f64, String> {
     above_zero(text).ok_or_else(|| "give a number above 0, in the unit of the baseline".into())
 }
@@ -74,26 +74,26 @@ impl From<DisparityRange> for Search {
     }
 }
 
-/// A range, and how it was found.
-pub(crate) struct Found {
+/// The range to search, and where it comes from.
+pub(crate) struct ResolvedRange {
     pub(crate) range: DisparityRange,
-    /// Whether sparse matches gave it.
+    /// Whether it was estimated from sparse matches.
     pub(crate) by_matches: bool,
 }
 
 impl Search {
-    /// Whether a calibration may have a say.
+    /// Whether a calibration can affect the range.
     pub(crate) fn takes_calibration(&self) -> bool {
         self.max_disparity.is_none() || self.takes_cameras().is_some()
     }
 
-    /// The flag that takes the cameras.
+    /// The flag that needs camera values, if it was given.
     pub(crate) fn takes_cameras(&self) -> Option<&'static str> {
         let nearest = self.min_depth.map(|_| "--min-depth");
         nearest.or(self.max_depth.map(|_| "--max-depth"))
     }
 
-    /// The disparities of the nearest and the farthest depth, rounded so that both are in the range.
+    /// The disparities of `--min-depth` and `--max-depth`, rounded outward so that both depths are searched.
     fn of_depths(&self, calibration: Option<(&Path, &Calibration)>) -> Result<[Option<i32>; 2]> {
         let Some(flag) = self.takes_cameras() else { return Ok([None, None]) };
         if let (Some(nearest), Some(farthest)) = (self.min_depth, self.max_depth)
@@ -105,29 +105,26 @@ impl Search {
             ));
         }
         let (path, calibration) = calibration.ok_or_else(|| {
-            Failure::usage(
-                flag,
-                "takes the cameras of a calibration; give one with --calib, or --max-disparity",
-            )
+            Failure::usage(flag, "needs a calibration; add --calib FILE, or use --max-disparity")
         })?;
         let rig = Rig::new(calibration).map_err(|e| failure::in_file(e, path, ""))?;
-        // What does not fit is far outside of what may be searched, which says so.
+        // The cast saturates, so a huge disparity is refused later as out of range.
         let nearest = self.min_depth.map(|depth| rig.disparity(depth).ceil() as i32);
         Ok([nearest, self.max_depth.map(|depth| rig.disparity(depth).floor() as i32)])
     }
 
-    /// The range to search in `pair`, where the user counts by `sign`; a `calibration` comes with its path.
+    /// The range to search in `pair`, for flags that count by `sign`. `calibration` comes with its path.
     pub(crate) fn range(
         &self,
         pair: &Pair,
         calibration: Option<(&Path, &Calibration)>,
         sign: Sign,
-    ) -> Result<Found> {
+    ) -> Result<ResolvedRange> {
         let (max, auto) = match self.max_disparity {
             Some(Largest::Pixels(max)) => (Some(max), false),
             other => (None, other.is_some()),
         };
-        // What is far is at 0 unless told otherwise, whichever end of the range that is.
+        // Infinity has disparity 0, so the far end defaults to 0 with either sign.
         let (near, far) = match sign {
             Sign::LeftMinusRight => (max, self.min_disparity),
             Sign::RightMinusLeft => (self.min_disparity, max),
@@ -158,13 +155,13 @@ impl Search {
             let [farthest, nearest] = [found.min, found.max].map(|end| sign.disparity(end));
             between(near.unwrap_or(nearest), far.unwrap_or(farthest))?
         };
-        // In the user's own terms where it makes no sense.
+        // Checked in the user's sign, so that a message quotes the user's numbers.
         sign.range(range).within(pair.size().0)?;
-        Ok(Found { range, by_matches: given.is_none() })
+        Ok(ResolvedRange { range, by_matches: given.is_none() })
     }
 }
 
-/// The range from `min` on that `calibration`, read from the file `path`, gives; `None` where it gives none.
+/// The range from `min` to `ndisp` - 1 of the `calibration` in the file `path`; `None` without `ndisp`.
 pub(crate) fn calibrated_range(
     path: &Path,
     calibration: &Calibration,

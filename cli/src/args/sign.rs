@@ -1,4 +1,4 @@
-//! Which way disparities count.
+//! The sign convention of disparities.
 
 use clap::ValueEnum;
 use mrfgs::check::Warning;
@@ -6,7 +6,7 @@ use mrfgs::image::Plane;
 use mrfgs::options::DisparityRange;
 use serde::Serialize;
 
-/// Which way disparities count for the user. The library always counts by the default.
+/// The user's sign convention. The library always uses the default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Sign {
@@ -18,7 +18,7 @@ pub(crate) enum Sign {
 }
 
 impl Sign {
-    /// A disparity of the library as the user counts it, or the other way round.
+    /// Converts a disparity between the conventions of the library and the user, in either direction.
     pub(crate) fn disparity(self, disparity: i32) -> i32 {
         match self {
             Self::LeftMinusRight => disparity,
@@ -26,13 +26,13 @@ impl Sign {
         }
     }
 
-    /// The same for a range.
+    /// Converts a range, in either direction.
     pub(crate) fn range(self, DisparityRange { min, max }: DisparityRange) -> DisparityRange {
         let ends = [min, max].map(|end| self.disparity(end));
         DisparityRange { min: ends[0].min(ends[1]), max: ends[0].max(ends[1]) }
     }
 
-    /// The same for a map; what is not finite stays as it is.
+    /// Converts a map, in either direction; non-finite values are kept.
     pub(crate) fn map(self, map: Plane<f32>) -> Plane<f32> {
         match self {
             Self::LeftMinusRight => map,
@@ -40,7 +40,7 @@ impl Sign {
         }
     }
 
-    /// A warning about the user's range.
+    /// Converts a warning to the user's convention.
     pub(crate) fn warning(self, warning: Warning) -> Warning {
         match warning {
             Warning::Clipped { end, upper, percent } => Warning::Clipped {

@@ -12,7 +12,7 @@ Examples:
   mrfgs completions zsh > ~/.zfunc/_mrfgs
   mrfgs completions fish > ~/.config/fish/completions/mrfgs.fish";
 
-/// Print what a shell needs to complete the command line
+/// Print a completion script for a shell
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {

@@ -11,18 +11,18 @@ use crate::console;
 use crate::failure::Result;
 use crate::outputs::StagedFolder;
 
-/// A rendered pair: copies of `testdata/mixed`, since the package must hold what is compiled into it.
+/// A rendered pair. Copies of `testdata/mixed`, as the package must contain them.
 const PAIR: [(&str, &[u8]); 2] = [
     ("left.png", include_bytes!("../../demo/left.png")),
     ("right.png", include_bytes!("../../demo/right.png")),
 ];
-/// Its range and cameras, and what else is made of it.
+/// The flags for this pair.
 const FLAGS: &str = "--max-disparity 47 --focal 240 --baseline 0.186m --also preview,points";
 
-/// The files that the demo makes of its pair, and what each is.
+/// The files that the demo writes, with descriptions.
 const MADE: [(&str, &str); 3] = [
     ("disparity.preview.png", "the map in colours"),
-    ("disparity.points.ply", "the points; MeshLab, CloudCompare and Blender show them"),
+    ("disparity.points.ply", "a point cloud, for MeshLab, CloudCompare or Blender"),
     ("disparity.pfm", "the disparities in pixels"),
 ];
 
@@ -31,18 +31,18 @@ Examples:
   mrfgs demo
   mrfgs demo /tmp/first-map";
 
-/// Match a rendered pair that is part of the program, and say what to do next
+/// Match a built-in pair, and show what to do next
 ///
-/// FOLDER gets the pair, its map, the map in colours, and the points in 3-D.
+/// FOLDER gets the pair, its disparity map, the map in colours, and a point cloud.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// The folder for the pair and what is made of it; it must be new or empty, or hold what a demo has made, which is made anew
+    /// Folder to write; must be new, empty or from an earlier demo, which is replaced
     #[arg(default_value = "mrfgs-demo")]
     folder: PathBuf,
 }
 
-/// The command line of `mrfgs match`.
+/// Parses a command line of `mrfgs match`.
 #[derive(Parser)]
 struct Matching {
     #[command(flatten)]
@@ -71,15 +71,15 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 This was mrfgs match {shown} {FLAGS}
 
 {made}
-Now your own pair. If it is rectified:        mrfgs match LEFT RIGHT disparity.pfm --also preview
-If it is not, and the cameras are calibrated: mrfgs match LEFT RIGHT disparity.pfm --also preview --rectify --calib FILE
-If it is not, and they are not:               mrfgs match LEFT RIGHT disparity.pfm --also preview --rectify
+Now try your own pair. Hand-held photos: mrfgs match LEFT RIGHT disparity.pfm --also preview --rectify
+A calibrated stereo camera:              mrfgs match LEFT RIGHT disparity.pfm --also preview --rectify --calib FILE
+Already rectified images:                mrfgs match LEFT RIGHT disparity.pfm --also preview
 "
     ))?;
     Ok(())
 }
 
-/// Whether `folder` holds the pair and nothing but what is made of it.
+/// Whether `folder` contains the pair and nothing but files of a demo.
 fn is_demo(folder: &Path) -> bool {
     let is_ours =
         |name: &OsStr| PAIR.iter().map(|file| file.0).chain(MADE.map(|file| file.0)).any(|own| name == own);
@@ -90,7 +90,7 @@ fn is_demo(folder: &Path) -> bool {
         && PAIR.iter().all(is_kept)
 }
 
-/// The pair and the map in `folder`.
+/// The paths of the pair and the map in `folder`.
 fn words(folder: &Path) -> [PathBuf; 3] {
     ["left.png", "right.png", "disparity.pfm"].map(|name| folder.join(name))
 }

@@ -23,35 +23,35 @@ Examples:
   mrfgs depth d.pfm --calib c --left l.png --also points --clip-depth 30
   mrfgs depth d.png --calib c --confidence d.confidence.png --min-confidence 48";
 
-/// Write depth and points of a disparity map that is there already
+/// Compute depth and points from an existing disparity map
 ///
-/// MAP is a disparity map in pixels, of this program or another one: .pfm, .tif, or .png with 16 bits as in KITTI. The files
-/// stand beside it or beside OUTPUT, as `mrfgs match --also` would write them: d.pfm gets d.depth.pfm and d.points.ply. The cameras are
-/// those of a rectified pair. Disparities count in 1/256 px.
+/// MAP is a disparity map in pixels, from this or another program: .pfm, .tif, or 16-bit .png as in KITTI. The outputs are named after MAP
+/// or OUTPUT as in `mrfgs match --also`: d.pfm gives d.depth.pfm and d.points.ply. The cameras are those of the rectified pair. Disparities
+/// are rounded to 1/256 px.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
     /// Disparity map of the left view
     map: PathBuf,
-    /// Name after which the files are called, in the place of MAP
+    /// Name that the outputs are derived from, instead of MAP
     output: Option<PathBuf>,
-    /// Calibration of the rectified pair, as `mrfgs match` takes it [default: a calib.txt beside MAP]
+    /// Calibration of the rectified pair, as for `mrfgs match` [default: a calib.txt beside MAP]
     #[arg(long, value_name = "FILE")]
     calib: Vec<PathBuf>,
     #[command(flatten)]
     crop: CropArgs,
     #[command(flatten)]
     numbers: CameraArgs,
-    /// Left image, whose colours points have
+    /// Left image, for the colours of points and pictures
     #[arg(long, value_name = "FILE")]
     left: Option<PathBuf>,
-    /// Confidence of each pixel, from 0 to 255, as --also confidence writes it [default: 255]
+    /// Confidence of each pixel, 0 to 255, as written by --also confidence [default: 255]
     #[arg(long, value_name = "FILE")]
     confidence: Option<PathBuf>,
     /// Sign convention of the disparities in MAP
     #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
     sign: Sign,
-    /// How many levels of whole numbers in MAP are one pixel of disparity; level 0 is unknown [default: 256 of a PNG with 16 bits]
+    /// Grey levels per pixel of disparity, for integers in MAP; level 0 is unknown [default: 256 for 16-bit PNG]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = scale)]
     scale: Option<f32>,
     #[command(flatten)]
@@ -68,13 +68,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let third = args.also.third()?;
     let output = args.output.as_deref().unwrap_or(&args.map);
     if args.also.limits.takes_confidence() && args.confidence.is_none() {
-        let reason = "takes the confidence of each pixel, which MAP does not hold; give it by --confidence";
+        let reason = "needs the confidence of each pixel; add --confidence FILE";
         return Err(Failure::usage("--min-confidence", reason));
     }
     if args.also.show_left() && args.left.is_none() {
         return Err(Failure::usage(
             "--left",
-            "gives the colours of points and pictures; give the left image of the pair",
+            "missing; points and pictures need the colours of the left image",
         ));
     }
     let inputs = [Some(&args.map), args.left.as_ref(), args.confidence.as_ref()].into_iter().flatten();
@@ -92,7 +92,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             let (width, height) = map.size();
             let [path, map] = [path, &args.map].map(|path| path.display());
             Err(Error::Mismatch(format!(
-                "{path} is {w} x {h} and {map} is {width} x {height}: give files of one view"
+                "{path} is {w} x {h} but {map} is {width} x {height}: give files of the same view"
             )))
         }
         _ => Ok(()),
@@ -148,16 +148,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// The warning about a map of which most is behind the cameras.
+/// A warning if most of a map lies behind the cameras.
 ///
 /// # Errors
-/// Where all of it is, or it holds no disparity.
+/// If all of it does, or there is no disparity.
 fn behind(args: &Args, map: &Plane<f32>, rig: &Rig) -> Result<Option<String>> {
     let in_front = InFront::of(map, rig);
     if in_front.all == 0 {
         return Err(Error::read(
             &args.map,
-            "holds no disparity: all of its pixels are infinite or no numbers",
+            "contains no disparity: all pixels are infinite or NaN",
         )
         .into());
     }
@@ -168,7 +168,7 @@ fn behind(args: &Args, map: &Plane<f32>, rig: &Rig) -> Result<Option<String>> {
     }
 }
 
-/// The calibration of a map of this size, and its file, where it has one.
+/// The calibration of a map of this size, and its file if it has one.
 fn calibration(args: &Args, size: (usize, usize)) -> Result<(Option<PathBuf>, Calibration)> {
     if let Some(calibration) = args.numbers.calibration(size) {
         return Ok((None, calibration));
@@ -179,17 +179,17 @@ fn calibration(args: &Args, size: (usize, usize)) -> Result<(Option<PathBuf>, Ca
     if let Some(files) = input::beside(&args.map) {
         return Ok((files.first().cloned(), input::of_rectified_images(&files, &args.crop, size)?));
     }
-    let reason = format!("there is no calib.txt beside {}; give the cameras of the pair", args.map.display());
+    let reason = format!("missing; there is no calib.txt beside {} either", args.map.display());
     Err(Failure::usage("--calib", reason))
 }
 
-/// The left image. Points take its colours alone, so it is read as both views.
+/// The left image. Only its colours matter, so it serves as both views.
 fn left(args: &Args, path: &Path) -> Result<Image> {
     let raster = args.reading.reader().raster(path)?;
     Ok(Pair::of_frames(raster.clone(), raster)?.left().clone())
 }
 
-/// The disparities that it holds.
+/// The range of the disparities in a map.
 fn range(map: &Plane<f32>) -> DisparityRange {
     let known = || map.data().iter().copied().filter(|d| d.is_finite());
     let (min, max) = (known().fold(f32::MAX, f32::min), known().fold(f32::MIN, f32::max));

@@ -32,19 +32,19 @@ pub(crate) fn run() -> Result<()> {
         let _ = writeln!(out, "{table}");
     }
     let _ = match devices.iter().find(|d| d.automatic) {
-        Some(device) => writeln!(out, "`auto` takes {}: {}", device.index, device.name),
+        Some(device) => writeln!(out, "`auto` uses {}: {}", device.index, device.name),
         None if devices.is_empty() => {
-            writeln!(out, "no Vulkan or Metal driver found: `auto` takes the CPU path")
+            writeln!(out, "no Vulkan or Metal driver found: `auto` uses the CPU")
         }
-        None => writeln!(out, "`auto` takes the CPU path"),
+        None => writeln!(out, "`auto` uses the CPU"),
     };
     console::print(&out)
 }
 
-/// The version of wgpu that Cargo.toml asks for.
+/// The version of wgpu in Cargo.toml.
 const WGPU: &str = "30";
 
-/// What a report of a bug should begin with: the versions of the program, of wgpu and of every driver.
+/// Prints what a bug report should include: the versions of the program, wgpu and every driver.
 pub(crate) fn print_versions() -> Result<()> {
     quiet_loader();
     let mut out = format!("mrfgs {}\nwgpu {WGPU}\n", env!("CARGO_PKG_VERSION"));

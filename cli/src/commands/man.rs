@@ -11,10 +11,10 @@ use mrfgs::image::write;
 use crate::failure::Result;
 use crate::outputs::{Written, files};
 
-/// Write the man pages: mrfgs.1 and one for each subcommand
+/// Write man pages: mrfgs.1 and one per subcommand
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder to write to, such as ~/.local/share/man/man1; created where there is none
+    /// Folder to write to, such as ~/.local/share/man/man1; created if it does not exist
     folder: PathBuf,
 }
 
@@ -22,7 +22,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, mut program: Command) -> Result<()> {
     files::create_folder(&args.folder).map_err(|e| match e.kind() {
         ErrorKind::NotFound => {
-            Error::write(&args.folder, "there is no folder to make it in; create that first")
+            Error::write(&args.folder, "its parent folder does not exist; create that first")
         }
         _ => Error::write(&args.folder, e),
     })?;

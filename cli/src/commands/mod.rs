@@ -1,4 +1,4 @@
-//! The commands of `mrfgs`, each in a file or folder of its own.
+//! The commands of `mrfgs`, one file or folder each.
 
 pub(crate) mod batch;
 pub(crate) mod bench;

@@ -11,28 +11,28 @@ use crate::outputs::files;
 use crate::table::Table;
 use crate::text::wrapped;
 
-/// Columns of the output.
+/// Width of the output in characters.
 const WIDTH: usize = 100;
 
 const EXAMPLES: &str = "\
 Examples:
   mrfgs presets
   mrfgs presets --all
-  mrfgs presets default > mine.toml   # edit it, and give it to --method
+  mrfgs presets default > mine.toml   # edit it, then use it with --method
   mrfgs match left.png right.png out.pfm --max-disparity 63 --method mine.toml";
 
-/// List the options of the method by group, with range, meaning and source, and their value in each preset
+/// List the options of the method with range, meaning and source, and their values in each preset
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// List also the options that only other readings of the paper turn
+    /// Also lists options that only exist to reproduce alternative readings of the paper
     #[arg(long)]
     all: bool,
-    /// Print this preset alone, with all its options, as a TOML file with comments which --method takes
+    /// Prints this preset as a commented TOML file for --method
     name: Option<String>,
     /// Writes the presets as JSON; `-` prints it instead of the text
     ///
-    /// It holds `presets`: for each one `name`, `about` and `method`, a table of values for each group.
+    /// It contains `presets`, each with `name`, `about` and `method`, a table of values per group.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -45,7 +45,7 @@ struct Row {
     method: Method,
 }
 
-/// What `--json` writes.
+/// The contents of `--json`.
 #[derive(Serialize)]
 struct Findings {
     presets: Vec<Row>,
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     files::deliver(args.json.as_deref(), &findings, &text, |_| Ok(()))
 }
 
-/// One preset as a TOML file.
+/// A preset as a TOML file.
 fn file(name: &str) -> Result<String> {
     let table = Method::preset(name)?.table();
     let mut out = String::new();
@@ -77,14 +77,14 @@ fn file(name: &str) -> Result<String> {
     Ok(out)
 }
 
-/// The keys with the values of all presets; those of readings of the paper only where `all` are asked for.
+/// All keys with their values in every preset; without `all`, keys for alternative readings of the paper are left out.
 fn listing(all: bool) -> String {
     let mut presets = Table::new("ll");
     for preset in PRESETS {
         presets.row([format!("{} ", preset.name), preset.about.to_owned()]);
     }
     let values: Vec<_> = PRESETS.iter().map(|preset| preset.method().table()).collect();
-    // One column for each preset.
+    // A column for each preset.
     let mut table = Table::new(&"l".repeat(1 + PRESETS.len()));
     let cells =
         |key: &str, values: Vec<String>| std::iter::once(key.to_owned()).chain(values).collect::<Vec<_>>();
@@ -102,18 +102,18 @@ fn listing(all: bool) -> String {
     let more = if all {
         ""
     } else {
-        "\n`mrfgs presets --all` lists what only other readings of the paper turn, too.\n"
+        "\n`mrfgs presets --all` also lists options for alternative readings of the paper.\n"
     };
     format!("{presets}\n{table}{more}")
 }
 
-/// What a key does, where it comes from, and which numbers it takes; words have lines of their own.
+/// Meaning, source and numeric range of a key; keywords get their own lines.
 fn meaning(key: &Key) -> String {
     let text = format!("{} ({}).", key.meaning.trim_end_matches('.'), key.source);
     if matches!(key.takes, Takes::Words(_)) { text } else { format!("{text} [{key}]") }
 }
 
-/// The words that a key takes, each with its meaning on lines of its own behind `lead`.
+/// The keywords of a key with their meanings, each on a line starting with `lead`.
 fn words(key: &Key, lead: &str) -> String {
     let Takes::Words(words) = key.takes else { return String::new() };
     let line =

@@ -17,36 +17,34 @@ const EXAMPLES: &str = "\
 Examples:
   mrfgs rectify left.png right.png rectified --calib stereo.yml
   mrfgs match rectified/im0.png rectified/im1.png d.pfm --also depth
-  # Two photographs of one camera, moved to the side, without a calibration:
+  # Two hand-held photos, without a calibration:
   mrfgs rectify left.jpg right.jpg rectified
-  # ROS has a file for each camera:
+  # ROS has a file per camera:
   mrfgs rectify l.png r.png rectified --calib left.yaml --calib right.yaml
-  # All that the cameras have seen:
+  # Keep everything that the cameras saw:
   mrfgs rectify l.png r.png rectified --calib camchain.yaml --alpha 1";
 
 /// Rectify a pair of raw images
 ///
-/// Rectified images have no lens distortion, and matches are on the same row. DIR gets im0.png and im1.png (transparent
-/// where there is no source), mask0.png and mask1.png (white where there is none), and with --calib the calibration of the
-/// rectified pair twice: calib.txt in Middlebury's form and cameras.yml in OpenCV's.
+/// Rectified images have no lens distortion, and matching points are in the same row. DIR gets im0.png and im1.png (transparent where a
+/// pixel has no source), mask0.png and mask1.png (white there), and with --calib the calibration of the rectified pair as calib.txt
+/// (Middlebury) and cameras.yml (OpenCV).
 ///
-/// Without --calib the pair is rectified by matches of its own, as of two photographs of one camera that was moved to the side by
-/// hand. A line tells how far that can be trusted. There is no scale then, and no depth. Images are turned upright by their EXIF
-/// orientation; with --calib they are not, because a calibration is of the pixels as they are stored.
+/// Without --calib the pair is rectified from its own matches, as for two photos taken side by side with one camera. A line tells how
+/// reliable that is. There is no scale then, and no depth. Images are rotated upright by their EXIF orientation, but not with --calib, as a
+/// calibration applies to pixels as stored.
 ///
-/// CALIB is OpenCV's YAML, XML or JSON (K1, D1, K2, D2, R, T, or R1, R2, P1, P2 too), ROS's `camera_info` of both cameras, Kalibr's
-/// camera chain (cam0 is the left camera), a file of EuRoC, KITTI, ORB-SLAM3, VINS-Fusion, Basalt, ZED, OAK, COLMAP, mrcal or OKVIS, or
-/// Middlebury's calib.txt. They are recognised by their content. Lenses are pinholes with radial and tangential distortion,
-/// fisheyes (equidistant; OpenCV's files say `fisheye: 1`), omni, double sphere, extended unified or field of view; the guide
-/// has a table.
+/// CALIB is OpenCV's YAML, XML or JSON (K1, D1, K2, D2, R, T, or R1, R2, P1, P2 too), ROS's `camera_info` of both cameras, Kalibr's camera
+/// chain (cam0 is the left camera), a file of EuRoC, KITTI, ORB-SLAM3, VINS-Fusion, Basalt, ZED, OAK, COLMAP, mrcal or OKVIS, or
+/// Middlebury's calib.txt, recognised by content. Lenses are pinholes with radial and tangential distortion, fisheyes (equidistant;
+/// `fisheye: 1` in OpenCV's files), omni, double sphere, extended unified or field of view; see the guide for a table.
 ///
-/// The method is that of OpenCV's `stereoRectify`. Infinitely far points have a disparity of 0. If one camera
-/// is above the other, both images are rotated by 90 degrees, so that rows are epipolar lines:
-/// counter-clockwise if the first camera is the upper one, clockwise if it is the lower one.
+/// The method is that of OpenCV's `stereoRectify`. Points at infinity have disparity 0. If one camera is above the other, both images are
+/// rotated by 90 degrees so that epipolar lines become rows: counter-clockwise if the first camera is the upper one, clockwise otherwise.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Image of the left camera: the first one of the calibration; or a file with both views, MPO or JPS, without RIGHT
+    /// Image of the left camera (the first in the calibration), or one file with both views (MPO, JPS), without RIGHT
     left: PathBuf,
     /// Image of the right camera
     right: Option<PathBuf>,
@@ -54,18 +52,17 @@ pub(crate) struct Args {
     #[arg(value_name = "DIR")]
     folder: Option<PathBuf>,
 
-    /// Calibration of the cameras; where it has several files, such as those of ROS, one after the other
-    /// [default: matches of the pair]
+    /// Calibration of the cameras; repeat the flag for several files, as with ROS [default: none, uses matches of the pair]
     #[arg(long, value_name = "CALIB")]
     calib: Vec<PathBuf>,
     #[command(flatten)]
     crop: CropArgs,
     #[command(flatten)]
     rectification: RectificationArgs,
-    /// Also writes where each rectified pixel comes from: map0x.pfm, map0y.pfm, map1x.pfm and map1y.pfm
+    /// Also writes the source position of each rectified pixel: map0x.pfm, map0y.pfm, map1x.pfm and map1y.pfm
     #[arg(long)]
     maps: bool,
-    /// Mask of the size of LEFT: where it is not black, LEFT is ignored
+    /// Mask of the size of LEFT: pixels that are not black are ignored
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
     #[command(flatten)]
@@ -77,7 +74,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(mut args: Args) -> Result<()> {
     input::behind_views(&args.left, &mut args.right, &mut args.folder)?;
-    let missing = || Failure::usage("DIR", "it is missing; give a folder for the rectified pair");
+    let missing = || Failure::usage("DIR", "missing; give a folder for the rectified pair");
     let folder = args.folder.take().ok_or_else(missing)?;
     stop::listen();
     let folder = StagedFolder::new_or_empty(&folder)?;

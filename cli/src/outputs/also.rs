@@ -1,4 +1,4 @@
-//! What `--also` writes beside a disparity map: one table, from which every command follows.
+//! The table of `--also` outputs, which every command uses.
 
 use std::path::{Path, PathBuf};
 
@@ -15,38 +15,37 @@ use crate::outputs::outcome::{Of, View};
 /// An output beside the disparity map.
 #[derive(Debug)]
 pub(crate) struct Also {
-    /// The word of `--also`, which is also in the name of the file. With an extension it asks for another format than that of
-    /// the word alone.
+    /// The word after `--also`, which is also in the file name. An extension selects another format.
     pub(crate) word: &'static str,
-    /// Empty where the help of another word tells of it.
+    /// Empty if another word's help describes it.
     pub(super) help: &'static str,
     pub(super) kind: Kind,
-    /// The key of the method that makes it.
+    /// The key of the method that enables it.
     pub(super) key: Option<&'static str>,
 }
 
-/// What an output shows, and thereby the format of its file.
+/// The content of an output, which determines its file format.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kind {
-    /// A map of disparities of a view, in the format of the disparity map.
+    /// A disparity map of a view, in the format of the main disparity map.
     Disparity(View, fn(&Maps) -> Option<Plane<f32>>),
-    /// A map of bytes, as 8-bit PNG.
+    /// An 8-bit map, as PNG.
     Bytes(fn(&Maps) -> &Plane<u8>),
-    /// The depth of every disparity, as float PFM, or TIFF where the disparity map is one.
+    /// Depths, as float PFM, or TIFF if the disparity map is one.
     Depth,
-    /// The same in whole millimetres, as 16-bit PNG.
+    /// Depths in whole millimetres, as 16-bit PNG.
     Millimetres,
     /// Depths in the view of a third camera, as float or in whole millimetres.
     Registered { millimetres: bool },
-    /// The errors to expect, of disparities or of depths, as float like depths.
+    /// Expected errors of disparities or depths, as float like depths.
     Sigma(Of),
-    /// A cloud of points, as PLY unless the word has an extension.
+    /// A point cloud, as PLY unless the word has an extension.
     Points(PointFrame),
-    /// The disparity map in colours, as PNG; with the left image on its left if `beside`.
+    /// The disparity map in colours, as PNG, with the left image to its left if `beside`.
     Picture { beside: bool },
 }
 
-/// All outputs, in the order in which they are written. One more is one more row.
+/// All outputs, in the order in which they are written.
 pub(super) static ALL: [Also; 20] = [
     row(
         "raw",
@@ -57,37 +56,37 @@ pub(super) static ALL: [Also; 20] = [
         key: Some("right-map"),
         ..row(
             "right",
-            "The disparity map of the right view, refined like that of the left one, in the format of the disparity map: \
-             right (x, y) with disparity d is seen at left (x + d, y)",
+            "The disparity map of the right view, post-processed like the left one, in the same format: \
+             right (x, y) with disparity d appears at left (x + d, y)",
             Kind::Disparity(View::Right, Maps::right_map),
         )
     },
     row(
         "depth",
-        "The depth of every pixel, as float: .pfm (+infinity where there is none), or .tif (NaN) if the disparity map is \
+        "The depth of every pixel, as float: .pfm (+infinity if unknown), or .tif (NaN) if the disparity map is \
          TIFF",
         Kind::Depth,
     ),
     row(
         "depth-mm",
-        "The depth of every pixel in millimetres, as ROS and TUM have it: 16-bit .png, 0 where there is none or it is above \
-         65535. It takes a calibration whose unit is known",
+        "The depth of every pixel in millimetres, as in ROS and TUM: 16-bit .png, 0 if unknown or above \
+         65535. Needs a calibration with a known unit",
         Kind::Millimetres,
     ),
     row(
         "depth-registered",
-        "The depth as the camera of --into sees it, along its axis and at its pixels, as float like depth: nothing where it sees \
-         what LEFT does not",
+        "The depth seen by the camera of --into, along its axis and at its pixels, as float like depth; unknown where it sees \
+         something that LEFT does not",
         Kind::Registered { millimetres: false },
     ),
     row(
         "depth-registered-mm",
-        "The same in millimetres, as depth-mm",
+        "Like depth-registered, in millimetres like depth-mm",
         Kind::Registered { millimetres: true },
     ),
     row(
         "points",
-        "Points with the colours of LEFT and their confidence: binary .ply (`quality`), x to the right, y down, z forward \
+        "A point cloud with the colours of LEFT and confidences: binary .ply (`quality`), x to the right, y down, z forward \
          of the left camera. Invalid, filled and low-confidence pixels are left out. points.pcd writes PCD (`intensity`, \
          for ROS, PCL and Open3D), points.las and points.laz write LAS 1.2 and LAZ (intensity: 257 times the confidence)",
         Kind::Points(PointFrame::Matched),
@@ -97,7 +96,7 @@ pub(super) static ALL: [Also; 20] = [
     row("points.laz", "", Kind::Points(PointFrame::Matched)),
     row(
         "points-original",
-        "The same in the frame of the left camera before --rectify: that of the calibration. Also as .pcd, .las and .laz",
+        "Like points, in the frame of the left camera before --rectify, as in the calibration. Also as .pcd, .las and .laz",
         Kind::Points(PointFrame::Original),
     ),
     row("points-original.pcd", "", Kind::Points(PointFrame::Original)),
@@ -105,29 +104,29 @@ pub(super) static ALL: [Also; 20] = [
     row("points-original.laz", "", Kind::Points(PointFrame::Original)),
     row(
         "confidence",
-        "The confidence: 8-bit .png, 0 to 255, how far the runner-up label is behind the best one, in 1/8 nat, as a mean over the pixels around",
+        "How sure each pixel is: 8-bit .png, 0 to 255. The lead of the best disparity over the runner-up in 1/8 nat, averaged over neighbouring pixels",
         Kind::Bytes(|maps| &maps.confidence),
     ),
     row(
         "validity",
-        "Why a pixel is what it is: 8-bit .png, the sum of 1 outside (the match is not in the right image), 2 \
+        "The status of each pixel: 8-bit .png, the sum of 1 outside (the match is not in the right image), 2 \
          occluded, 4 small region, 8 low confidence, 16 filled, 32 masked, 64 tie (two disparities match equally \
-         well), 128 outvoted (by the pixels around it); 0 is measured and trusted",
+         well), 128 outvoted (by neighbouring pixels); 0 is measured and trusted",
         Kind::Bytes(|maps| &maps.validity),
     ),
     row(
         "sigma",
-        "The error to expect of every measured disparity, in pixels, from its confidence: about two thirds are nearer to the truth. \
+        "The expected error of every measured disparity, in pixels, from its confidence: about two thirds of the errors are smaller. \
          As float: .pfm (+infinity where nothing was measured), or .tif (NaN) if the disparity map is TIFF",
         Kind::Sigma(Of::Disparities),
     ),
     row(
         "depth-sigma",
-        "The error to expect of every depth, in its unit, likewise: Z sigma / (d + doffs)",
+        "The expected error of every depth, in its unit: Z sigma / (d + doffs)",
         Kind::Sigma(Of::Depths),
     ),
-    row("preview", "The disparity map in colours, with a scale: .png", Kind::Picture { beside: false }),
-    row("side-by-side", "LEFT and beside it the preview: .png", Kind::Picture { beside: true }),
+    row("preview", "The disparity map in colours, with a colour bar: .png", Kind::Picture { beside: false }),
+    row("side-by-side", "LEFT and the preview side by side: .png", Kind::Picture { beside: true }),
 ];
 
 const fn row(word: &'static str, help: &'static str, kind: Kind) -> Also {
@@ -135,12 +134,12 @@ const fn row(word: &'static str, help: &'static str, kind: Kind) -> Also {
 }
 
 impl Also {
-    /// The flag that asks for it.
+    /// The flag that selects it.
     pub(crate) fn flag(&self) -> String {
         format!("--also {}", self.word)
     }
 
-    /// Its topic in ROS; `None` where it is no message there.
+    /// Its topic in ROS; `None` if it is never published.
     pub(super) fn topic(&self) -> Option<messages::Topic> {
         match self.kind {
             Kind::Depth => Some(messages::DEPTH),
@@ -155,27 +154,27 @@ impl Also {
         }
     }
 
-    /// Whether it takes the unit of the baseline, too.
+    /// Whether it needs the unit of the baseline.
     pub(crate) fn takes_unit(&self) -> bool {
         matches!(self.kind, Kind::Millimetres | Kind::Registered { millimetres: true })
     }
 
-    /// Refuses it as a message where the unit of the baseline of `rig` is not known.
+    /// Refuses to publish it in ROS if the unit of the baseline of `rig` is unknown.
     pub(crate) fn check_metres(&self, rig: &Rig) -> Result<()> {
         if rig.unit().millimetres().is_none() {
-            let reason = "is in metres in ROS, and nothing says the unit of the baseline; add an entry `unit` to the calibration: mm, cm or \
-                          m, or give it with --baseline";
+            let reason = "is in metres in ROS, but the unit of the baseline is unknown; add an entry `unit` to the calibration: mm, cm or \
+                          m, or add it to --baseline";
             return Err(Failure::usage(self.flag(), reason));
         }
         Ok(())
     }
 
-    /// Its word without an extension.
+    /// The word without its extension.
     fn stem(&self) -> &'static str {
         self.word.split('.').next().unwrap_or(self.word)
     }
 
-    /// Its file beside the disparity map `output`.
+    /// The path of its file beside the disparity map `output`.
     pub(crate) fn beside(&self, output: &Path) -> PathBuf {
         let own = output.extension().unwrap_or_default().to_string_lossy();
         let is_tiff = ["tif", "tiff"].iter().any(|tiff| own.eq_ignore_ascii_case(tiff));
@@ -189,7 +188,7 @@ impl Also {
         output.with_extension(format!("{}.{extension}", self.stem()))
     }
 
-    /// Says before any computing whether it can be written to `path`, with disparities in `range`.
+    /// Checks before any computing that it can be written to `path`, with disparities in `range`.
     pub(crate) fn check(&self, path: &Path, range: DisparityRange) -> mrfgs::Result<()> {
         match self.kind {
             Kind::Disparity(..) => write::check_disparity_path(path, range.min, range.max),
@@ -204,12 +203,12 @@ impl Also {
     }
 }
 
-/// What stands between stem and extension in the names of all such files: ".raw" and the like.
+/// The parts between stem and extension in the names of all output files, such as ".raw".
 pub(crate) fn endings() -> impl Iterator<Item = String> {
     ALL.iter().map(|also| format!(".{}", also.stem()))
 }
 
-/// The files of all outputs beside the disparity map `output`, wanted or not.
+/// The paths of all possible outputs beside the disparity map `output`.
 pub(crate) fn all_beside(output: &Path) -> impl Iterator<Item = PathBuf> {
     ALL.iter().map(|also| also.beside(output))
 }

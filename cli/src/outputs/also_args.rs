@@ -1,4 +1,4 @@
-//! The flags of the outputs beside a disparity map: what is wanted of the table, whether it can be had, and how it is made.
+//! Flags of the outputs beside a disparity map: their selection, checks and writing.
 
 use std::path::{Path, PathBuf};
 
@@ -25,20 +25,20 @@ use crate::text::plural;
 #[derive(clap::Args, Serialize)]
 #[command(next_help_heading = "More outputs")]
 pub(crate) struct AlsoArgs {
-    /// Writes more files beside the disparity map, as STEM.WORD.EXTENSION: `--also raw,validity` with d.pfm writes d.raw.pfm
-    /// and d.validity.png
+    /// Also writes these outputs beside the disparity map, as STEM.WORD.EXTENSION: `--also raw,validity` with d.pfm writes d.raw.pfm and
+    /// d.validity.png
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parser())]
-    // The names of the outputs say it.
+    // Not recorded: the file names tell.
     #[serde(skip)]
     also: Vec<&'static Also>,
-    /// Colours of the previews, from far to near [default: turbo]
+    /// Colour map of the previews [default: turbo]
     #[arg(long, value_name = "NAME", value_parser = colours())]
     #[serde(serialize_with = "colours_in_a_word")]
     colours: Option<ColourMap>,
-    /// The camera of --also depth-registered, such as that of a rig's colours: its lens, its size, and how it stands to the left
-    /// camera. One camera by the names of OpenCV (K, D, R, T and a size), Kalibr's chain, whose last camera it is, or the file of an OAK
+    /// Calibration of the camera of --also depth-registered, such as a colour camera: lens, image size and pose relative to the left
+    /// camera. OpenCV (K, D, R, T and a size), a Kalibr chain (its last camera), or an OAK file
     #[arg(long, value_name = "FILE")]
-    // It is among the inputs.
+    // Not recorded here: it is among the inputs.
     #[serde(skip)]
     pub(crate) into: Option<PathBuf>,
     #[command(flatten)]
@@ -53,7 +53,7 @@ fn parser() -> impl TypedValueParser<Value = &'static Also> {
         .try_map(|word| ALL.iter().find(|also| also.word == word).ok_or("no such word"))
 }
 
-/// The words of `--colours`, with their help.
+/// The values of `--colours`, with their help.
 const COLOURS: [(&str, &str, ColourMap); 3] = [
     ("turbo", "Cold to warm", ColourMap::Turbo),
     ("viridis", "Violet to yellow, with even steps of lightness", ColourMap::Viridis),
@@ -72,60 +72,59 @@ fn colours_in_a_word<S: Serializer>(colours: &Option<ColourMap>, to: S) -> Resul
 }
 
 impl AlsoArgs {
-    /// The wanted outputs, each once, in the order of the table.
+    /// The selected outputs, each once, in the order of the table.
     pub(crate) fn wanted(&self) -> impl Iterator<Item = &'static Also> {
         ALL.iter().filter(|also| self.also.iter().any(|wanted| wanted.word == also.word))
     }
 
-    /// The camera of `--into`.
+    /// Reads the camera of `--into`.
     ///
     /// # Errors
-    /// For a file that makes no sense, and where an output takes a camera that is not given, or none takes the one that is.
+    /// If the file is malformed, if an output needs a camera that is not given, or if no output uses the given one.
     pub(crate) fn third(&self) -> Result<Option<ThirdCamera>> {
         match (&self.into, self.wanted().find(|also| matches!(also.kind, Kind::Registered { .. }))) {
             (Some(file), Some(_)) => Ok(Some(third::read(file)?)),
             (None, None) => Ok(None),
             (Some(_), None) => Err(Failure::usage(
                 "--into",
-                "is the camera of --also depth-registered and depth-registered-mm; add one of them, or leave it out",
+                "is only used by --also depth-registered and depth-registered-mm; add one of them, or remove --into",
             )),
             (None, Some(also)) => {
-                let reason = "is in the view of a third camera; give that by --into, or take --also depth";
+                let reason = "needs a third camera; add --into FILE, or use --also depth";
                 Err(Failure::usage(also.flag(), reason))
             }
         }
     }
 
-    /// The camera of `--into` for messages, in a frame that is called as the file without its extension.
+    /// The camera of `--into` for messages; the frame is named after the file.
     pub(crate) fn framed(&self, third: Option<&ThirdCamera>) -> Option<messages::Third> {
         let stem = self.into.as_ref()?.file_stem()?;
         third.map(|camera| messages::Third { frame_id: stem.to_string_lossy().into_owned(), camera: *camera })
     }
 
-    /// Refuses colours without a picture, and the original camera where the images are not rectified.
+    /// Refuses --colours without a picture, and points in the original frame without a rectification.
     pub(crate) fn check(&self, rectifies: bool) -> Result<()> {
         self.check_clip()?;
         let is_picture = |also: &Also| matches!(also.kind, Kind::Picture { .. });
         if self.colours.is_some() && !self.wanted().any(is_picture) {
-            let reason = "are those of a preview; add --also preview, or leave --colours out";
+            let reason = "needs a preview; add --also preview, or remove --colours";
             return Err(Failure::usage("--colours", reason));
         }
         let is_original = |also: &&Also| matches!(also.kind, Kind::Points(PointFrame::Original));
         if let Some(word) = self.wanted().find(is_original).filter(|_| !rectifies) {
-            let reason =
-                "is of images that `mrfgs match` rectifies; add --rectify there, or take --also points";
+            let reason = "needs images rectified by `mrfgs match`; add --rectify there, or use --also points";
             return Err(Failure::usage(word.flag(), reason));
         }
         Ok(())
     }
 
-    /// `method`, which makes every wanted output.
+    /// Enables every selected output in `method`.
     pub(crate) fn made_by(&self, mut method: Method) -> Result<Method> {
         method.set_all(self.wanted().filter_map(|also| also.key).map(|key| (key, "true")))?;
         Ok(method)
     }
 
-    /// The wanted output that takes most of the cameras.
+    /// The selected output that needs most of the camera: a unit first, else any camera.
     pub(crate) fn take_cameras(&self) -> Option<&'static Also> {
         let is_of_cameras = |also: &&Also| {
             matches!(
@@ -137,15 +136,15 @@ impl AlsoArgs {
         self.wanted().find(|also| also.takes_unit()).or_else(first)
     }
 
-    /// Whether a wanted output shows the left image.
+    /// Whether a selected output shows the left image.
     pub(crate) fn show_left(&self) -> bool {
         self.wanted().any(|also| matches!(also.kind, Kind::Points(..) | Kind::Picture { beside: true }))
     }
 
-    /// The wanted outputs of a map that is there: depth where none are named.
+    /// The selected outputs for an existing map; depth by default.
     ///
     /// # Errors
-    /// For an output that takes more than the map.
+    /// For an output that needs more than the map.
     pub(crate) fn of_map(&self) -> Result<Vec<&'static Also>> {
         let mut wanted: Vec<_> = self.wanted().collect();
         if wanted.is_empty() {
@@ -162,10 +161,9 @@ impl AlsoArgs {
             )
         };
         match wanted.iter().find(|also| !is_of_map(also)) {
-            Some(word) => Err(Failure::usage(
-                word.flag(),
-                "is found by a match, and MAP does not hold it; leave it out",
-            )),
+            Some(word) => {
+                Err(Failure::usage(word.flag(), "can only be computed by a match, not from MAP; remove it"))
+            }
             None => Ok(wanted),
         }
     }
@@ -176,10 +174,10 @@ impl AlsoArgs {
         empty::left_out(self.limits, outcome, points)
     }
 
-    /// Refuses a limit of depths without depths.
+    /// Refuses --clip-depth without depths or points.
     fn check_clip(&self) -> Result<()> {
         if self.limits.clip_depth.is_some() && self.take_cameras().is_none() {
-            let reason = "is of depths and points; add --also depth or points, or leave it out";
+            let reason = "needs depths or points; add --also depth or --also points, or remove --clip-depth";
             return Err(Failure::usage("--clip-depth", reason));
         }
         Ok(())
@@ -196,30 +194,30 @@ impl AlsoArgs {
         }
     }
 
-    /// What a film shows: the preview, or that with the left image beside it where that is the wanted output.
+    /// The picture of a film: the preview, with the left image beside it if so selected.
     pub(crate) fn film_picture(&self, outcome: &Outcome) -> Plane<[u8; 3]> {
         self.picture(self.show_left(), outcome)
     }
 
-    /// Refuses outputs that no film shows.
+    /// Refuses outputs that a film cannot show.
     pub(crate) fn check_film(&self) -> Result<()> {
         self.check_clip()?;
         match self.wanted().find(|also| !matches!(also.kind, Kind::Picture { .. })) {
             Some(also) => Err(Failure::usage(
                 also.flag(),
-                "is a file of each frame, and OUTPUT is a film; give the name of a folder as OUTPUT",
+                "writes a file per frame, but OUTPUT is a film; give a folder as OUTPUT",
             )),
             None => Ok(()),
         }
     }
 
-    /// Refuses outputs that are no message of ROS; `remedy` says what helps.
+    /// Refuses outputs that ROS has no message for; `remedy` ends the error.
     pub(crate) fn check_messages(&self, remedy: &str) -> Result<()> {
         self.check(false)?;
         match self.wanted().find(|also| also.topic().is_none()) {
             Some(also) => {
                 let reason = format!(
-                    "is no message of ROS, which are depth, depth-mm, depth-registered, depth-registered-mm, points, confidence, validity, \
+                    "cannot be sent as a ROS message; possible are depth, depth-mm, depth-registered, depth-registered-mm, points, confidence, validity, \
                      sigma and depth-sigma; {remedy}"
                 );
                 Err(Failure::usage(also.flag(), reason))
@@ -228,12 +226,12 @@ impl AlsoArgs {
         }
     }
 
-    /// The topics of the wanted outputs, each with the type of its messages.
+    /// The topics of the selected outputs, each with its message type.
     pub(crate) fn topics(&self) -> impl Iterator<Item = messages::Topic> {
         self.wanted().filter_map(Also::topic)
     }
 
-    /// The wanted outputs as messages.
+    /// The selected outputs, to be sent as messages.
     pub(crate) fn contents(&self, outcome: &Outcome) -> Vec<Content> {
         let &Outcome { maps, left, rig, third, .. } = outcome;
         let near = |rig: &Rig| self.limits.near(outcome.final_map(self.limits), rig);
@@ -266,7 +264,7 @@ impl AlsoArgs {
         self.wanted().filter_map(content).collect()
     }
 
-    /// Writes `also` to `path`. Returns what there is to say of it.
+    /// Writes `also` to `path`. Returns a remark for the user, if there is one.
     pub(crate) fn write(&self, also: &Also, path: &Path, outcome: &Outcome) -> Result<Option<String>> {
         let &Outcome { maps, sign, left, rig, rectifying, third, .. } = outcome;
         match also.kind {
@@ -290,7 +288,7 @@ impl AlsoArgs {
                 let Some((rig, camera)) = rig.zip(third) else { return Ok(None) };
                 let map = self.limits.near(outcome.final_map(self.limits), &rig);
                 if !millimetres {
-                    // A third camera sees nothing of a map's georeference.
+                    // The georeference of the map does not apply to a third camera.
                     let depths = rig.registered(&map, &camera);
                     Writer::default().depth(path, &depths)?;
                     return Ok(Some(format!("depths of --into {}", span(&depths))));
@@ -320,7 +318,7 @@ impl AlsoArgs {
     }
 }
 
-/// The least and the largest of what is known.
+/// The smallest and the largest known depth.
 fn span(depths: &Plane<f32>) -> String {
     let known = || depths.data().iter().copied().filter(|depth| depth.is_finite());
     match known().reduce(f32::min).zip(known().reduce(f32::max)) {

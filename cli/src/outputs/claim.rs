@@ -1,4 +1,4 @@
-//! Locks, so that one run at a time makes a pair of a batch or a folder of outputs.
+//! Locks that let only one run at a time write a pair of a batch or an output folder.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
@@ -9,23 +9,21 @@ use mrfgs::error::Reason;
 use mrfgs::{Error, Result};
 use same_file::Handle;
 
-/// The file that is locked.
+/// The name of the lock file.
 const LOCK: &str = "lock";
-/// The folders that may be made: a new one, and the old one while the new one takes its place.
+/// Folders in a staging folder: the new one, and the old one while it is being replaced.
 pub(crate) const FOLDERS: [&str; 2] = ["new", "old"];
 
-/// The claim of this run to a pair or a folder, and the staging folder in which its files are made. As long as the claim lives,
-/// the staging folder is locked; then it is removed. However the process ends, its lock goes with it, and an unlocked folder may
-/// be left.
+/// This run's claim to a pair or a folder, with the staging folder in which its files are made. The folder stays locked while the claim
+/// lives and is then removed. The lock ends with the process in any case; a killed run leaves an unlocked folder.
 pub(crate) struct Claim {
     folder: PathBuf,
-    /// Held for its lock.
+    /// Keeps the lock.
     _lock: File,
 }
 
 impl Claim {
-    /// Claims `name` in the output folder `parent`, and removes what a killed run has left of it; `None` while another run holds
-    /// it.
+    /// Claims `name` in the output folder `parent` and removes what a killed run left of it; `None` if another run holds it.
     pub(crate) fn new(parent: &Path, name: impl AsRef<OsStr>) -> Result<Option<Self>> {
         let folder = staging(parent, name.as_ref());
         let failed = |e: io::Error| Error::write(&folder, e);
@@ -41,13 +39,13 @@ impl Claim {
             }
             let path = folder.join(LOCK);
             let lock = match File::options().write(true).create(true).truncate(false).open(&path) {
-                // Whose folder that was has just removed it.
+                // Its owner has just removed the folder.
                 Err(e) if e.kind() == ErrorKind::NotFound => continue,
                 lock => lock.map_err(failed)?,
             };
             match lock.try_lock() {
                 Err(TryLockError::WouldBlock) => return Ok(None),
-                // Some file systems of networks have no locks; there it is up to the user.
+                // Some network file systems have no locks; there, concurrent runs are up to the user.
                 Err(TryLockError::Error(_)) | Ok(()) => {}
             }
             let locked = Handle::from_file(lock.try_clone().map_err(failed)?).map_err(failed)?;
@@ -56,11 +54,11 @@ impl Claim {
                 claim.clear().map_err(failed)?;
                 return Ok(Some(claim));
             }
-            // It was removed between opening and locking, so it keeps nobody out.
+            // The lock file was removed between opening and locking, so it protects nothing. Try again.
         }
     }
 
-    /// Removes what a killed run has left of `name`, unless another run holds it.
+    /// Removes what a killed run left of `name`, unless another run holds it.
     pub(crate) fn remove_remains(parent: &Path, name: &str) -> Result<()> {
         if staging(parent, name.as_ref()).exists() {
             Self::new(parent, name)?;
@@ -68,7 +66,7 @@ impl Claim {
         Ok(())
     }
 
-    /// Where the files are made.
+    /// The staging folder.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
@@ -77,7 +75,7 @@ impl Claim {
     fn clear(&self) -> io::Result<()> {
         for entry in fs::read_dir(&self.folder)? {
             let entry = entry?;
-            // Folders of any other name are not ours, and nothing is claimed then.
+            // Folders with other names are not ours: the claim fails.
             if FOLDERS.iter().any(|name| entry.file_name() == *name) {
                 fs::remove_dir_all(entry.path())?;
             } else if entry.file_name() != LOCK {
@@ -90,14 +88,14 @@ impl Claim {
 
 impl Drop for Claim {
     fn drop(&mut self) {
-        // The lock last: once it is gone, the folder may be another run's.
+        // Remove the lock last: after that the folder may be another run's.
         if self.clear().is_ok() && fs::remove_file(self.folder.join(LOCK)).is_ok() {
             let _ = fs::remove_dir(&self.folder);
         }
     }
 }
 
-/// The staging folder for `name`. Its name is known, so that the next run finds what a killed run has left.
+/// The staging folder for `name`. Its name is fixed, so that the next run finds the remains of a killed one.
 fn staging(parent: &Path, name: &OsStr) -> PathBuf {
     let mut folder = OsString::from(".");
     folder.push(name);
@@ -119,12 +117,12 @@ mod tests {
         fs::write(first.folder().join("a.pfm"), "half").unwrap();
         assert!(claimed().is_none() && Claim::new(folder.path(), "b").unwrap().is_some());
         Claim::remove_remains(folder.path(), "a").unwrap();
-        assert!(first.folder().join("a.pfm").exists(), "it is not for others to remove");
+        assert!(first.folder().join("a.pfm").exists(), "only the owner removes it");
         drop(first);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
         assert!(claimed().is_some());
 
-        // What a killed run leaves: no lock, but the file that was locked.
+        // A killed run leaves the lock file, but no lock.
         let remains = staging(folder.path(), "a".as_ref());
         fs::create_dir_all(remains.join("new/below")).unwrap();
         for file in ["lock", "a.pfm", "new/b.pfm"] {

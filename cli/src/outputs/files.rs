@@ -1,4 +1,4 @@
-//! Where outputs go, and the files written so far.
+//! Paths of outputs, and cleaning up after a failure.
 
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -11,14 +11,14 @@ use serde::Serialize;
 use crate::console;
 use crate::failure::{Failure, Result};
 
-/// Refuses outputs that would overwrite an input or each other; each comes with the name of its flag or argument.
+/// Refuses outputs that would overwrite an input or each other; each path comes with its flag or argument.
 pub(crate) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> Result<()> {
     let mut taken: Vec<(&str, PathBuf)> =
         inputs.iter().filter_map(|(name, path)| Some((*name, place(path)?))).collect();
     for (name, path) in outputs {
         let Some(place) = place(path) else { continue };
         if let Some((other, _)) = taken.iter().find(|(_, p)| *p == place) {
-            let reason = format!("{} is {other} already; give another name", path.display());
+            let reason = format!("{} is already {other}; give another name", path.display());
             return Err(Failure::usage(*name, reason));
         }
         taken.push((name, place));
@@ -26,7 +26,7 @@ pub(crate) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> R
     Ok(())
 }
 
-/// Where a file is, or would be, however its path is spelt; `None` for a device or a pipe, which any number may share.
+/// The canonical path of a file, existing or not; `None` for a device or a pipe, which may be used twice.
 fn place(path: &Path) -> Option<PathBuf> {
     if let Ok(place) = fs::canonicalize(path) {
         return place.is_file().then_some(place);
@@ -34,17 +34,17 @@ fn place(path: &Path) -> Option<PathBuf> {
     Some(fs::canonicalize(parent(path)).ok()?.join(path.file_name()?))
 }
 
-/// Where a path leads without its last part.
+/// The parent of a path, `.` if it has none.
 pub(crate) fn parent(path: &Path) -> &Path {
     path.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."))
 }
 
-/// The files and folders written so far: gone again when dropped, unless kept.
+/// The files and folders written so far. Dropping it removes them, unless they are kept.
 #[derive(Default)]
 pub(crate) struct Written(Vec<PathBuf>);
 
 impl Written {
-    /// Notes that `path` has been written, if that went well.
+    /// Records `path` if it was written.
     pub(crate) fn note<T, E: Into<Failure>>(&mut self, path: &Path, result: Result<T, E>) -> Result<T> {
         if result.is_ok() {
             self.0
@@ -53,7 +53,7 @@ impl Written {
         result.map_err(Into::into)
     }
 
-    /// Keeps them: all went well.
+    /// Keeps the files.
     pub(crate) fn keep(mut self) {
         self.0.clear();
     }
@@ -72,7 +72,7 @@ pub(crate) fn is_printed(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// Finds out before any computing whether the JSON has somewhere to go.
+/// Checks before any computing that the JSON can be written.
 pub(crate) fn check_json_path(json: Option<&Path>) -> mrfgs::Result<()> {
     match json {
         Some(path) if is_printed(path) => console::check_leads_somewhere(),
@@ -81,12 +81,12 @@ pub(crate) fn check_json_path(json: Option<&Path>) -> mrfgs::Result<()> {
     }
 }
 
-/// The file that the JSON goes to, unless it is printed.
+/// The path of the JSON, unless it goes to standard output.
 pub(crate) fn json_file(json: Option<&Path>) -> Option<&Path> {
     json.filter(|path| !is_printed(path))
 }
 
-/// Finds out before any computing whether the JSON can be written, and refuses it in place of an input.
+/// Checks before any computing that the JSON can be written and does not overwrite an input.
 pub(crate) fn check_json(json: Option<&Path>, inputs: impl IntoIterator<Item = PathBuf>) -> Result<()> {
     check_json_path(json)?;
     let Some(path) = json_file(json) else { return Ok(()) };
@@ -101,7 +101,8 @@ pub(crate) fn json_text(path: &Path, findings: &impl Serialize) -> Result<String
     Ok(text + "\n")
 }
 
-/// Delivers findings: as JSON where it is asked for, with whatever `more` writes, and as text unless the JSON is printed.
+/// Writes the findings as JSON if `json` is given, and prints the text unless the JSON goes to standard output. `more` writes further
+/// files.
 pub(crate) fn deliver(
     json: Option<&Path>,
     findings: &impl Serialize,
@@ -122,7 +123,7 @@ pub(crate) fn deliver(
     Ok(console::print(&printed)?)
 }
 
-/// Makes a folder unless it is there. Says whether it was not.
+/// Creates a folder if it does not exist, and returns whether it did so.
 pub(crate) fn create_folder(path: &Path) -> io::Result<bool> {
     match fs::create_dir(path) {
         Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(false),
@@ -130,11 +131,11 @@ pub(crate) fn create_folder(path: &Path) -> io::Result<bool> {
     }
 }
 
-/// Where a folder for outputs is, or would be.
+/// The canonical path of an output folder, existing or not.
 pub(crate) fn folder_place(name: &Path) -> mrfgs::Result<PathBuf> {
     match fs::canonicalize(name) {
         Ok(place) if place.is_dir() => Ok(place),
-        Ok(_) => Err(Error::write(name, "is a file; give the name of a folder")),
+        Ok(_) => Err(Error::write(name, "is a file; give a folder")),
         Err(_) => {
             let parent = parent(name);
             match (fs::canonicalize(parent), name.file_name()) {

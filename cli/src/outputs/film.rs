@@ -1,4 +1,4 @@
-//! Films of maps: YUV4MPEG2, or what ffmpeg makes of it.
+//! Films of maps: YUV4MPEG2, or other formats through ffmpeg.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -10,10 +10,10 @@ use crate::console;
 use crate::ffmpeg::{self, Encoder};
 use crate::outputs::files::is_printed;
 
-/// Frames a second where the input does not say it.
+/// Frames per second if the input does not tell.
 const RATE: (usize, usize) = (25, 1);
 
-/// A film in the making. A file appears when it is [finished](Self::finish).
+/// A film being written. The file appears on [`finish`](Self::finish).
 pub(crate) struct Film {
     path: PathBuf,
     rate: (usize, usize),
@@ -21,7 +21,7 @@ pub(crate) struct Film {
     sink: Option<Sink>,
 }
 
-/// Where the frames go.
+/// The destination of the frames.
 enum Sink {
     Printed,
     File(Growing),
@@ -41,15 +41,15 @@ impl Sink {
 }
 
 impl Film {
-    /// A film at `path`, or `-` for standard output, of `rate` frames a second.
+    /// A film at `path`, or `-` for standard output, with `rate` frames per second (a fraction).
     pub(crate) fn new(path: &Path, rate: Option<(usize, usize)>) -> Self {
         Self { path: path.to_owned(), rate: rate.unwrap_or(RATE), sink: None }
     }
 
-    /// Adds a frame; all have one size.
+    /// Adds a frame; all frames must have the same size.
     ///
     /// # Errors
-    /// [`Error::Write`] when it cannot be written, or its reader has left.
+    /// [`Error::Write`] if it cannot be written, or the reader of a pipe has left.
     pub(crate) fn add(&mut self, picture: &Plane<[u8; 3]>) -> Result<()> {
         let mut bytes = Vec::with_capacity(3 * picture.data().len() + 100);
         let sink = if let Some(sink) = &mut self.sink {
@@ -75,7 +75,7 @@ impl Film {
     /// Ends the film.
     ///
     /// # Errors
-    /// [`Error::Write`] when it cannot be written.
+    /// [`Error::Write`] if it cannot be written.
     pub(crate) fn finish(self) -> Result<()> {
         match self.sink {
             Some(Sink::File(file)) => file.finish(),
@@ -85,10 +85,10 @@ impl Film {
     }
 }
 
-/// Luma and chroma by ITU-R BT.601: black is 16, white 235.
+/// RGB to luma and chroma of ITU-R BT.601, limited range: black is 16, white 235.
 fn to_yuv([r, g, b]: [u8; 3]) -> [u8; 3] {
     let [r, g, b] = [r, g, b].map(i32::from);
-    // In 1/2^16.
+    // Coefficients in 1/2^16.
     let sum = |offset: i32, sum: i32| ((sum + 32_768) / 65_536 + offset) as u8;
     let chroma = |sum: i32| ((sum + (128 << 16) + 32_768) >> 16) as u8;
     [

@@ -1,4 +1,4 @@
-//! What is left out of the outputs: what is not sure, and what is far away.
+//! Limits that leave uncertain or distant pixels out of the outputs.
 
 use std::borrow::Cow;
 
@@ -9,26 +9,25 @@ use serde::Serialize;
 
 use crate::args::depth;
 
-/// What is left out of the outputs.
 #[derive(clap::Args, Clone, Copy, Serialize)]
 pub(crate) struct Limits {
-    /// Pixels of less confidence (0 to 255), and filled ones, have no disparity: in OUTPUT, and in previews, depths and points
+    /// Drops pixels below this confidence (0 to 255), and filled ones, from OUTPUT, previews, depths and points
     #[arg(long, value_name = "N")]
     #[serde(skip_serializing_if = "Option::is_none")]
     min_confidence: Option<u8>,
-    /// Depths beyond this, in the unit of the baseline, are left out of depths and points
+    /// Drops depths and points beyond this depth, in the unit of the baseline
     #[arg(long, value_name = "Z", allow_negative_numbers = true, value_parser = depth)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) clip_depth: Option<f64>,
 }
 
 impl Limits {
-    /// Whether the confidence counts.
+    /// Whether a confidence limit was given.
     pub(crate) fn takes_confidence(self) -> bool {
         self.min_confidence.is_some()
     }
 
-    /// `map`, of the disparities of `maps`, without those of too little confidence.
+    /// Removes disparities of low confidence and filled ones from `map`, which belongs to `maps`.
     pub(super) fn sure(self, mut map: Plane<f32>, maps: &Maps) -> Plane<f32> {
         if let Some(least) = self.min_confidence {
             let pixels = maps.confidence.data().iter().zip(maps.validity.data());
@@ -41,12 +40,12 @@ impl Limits {
         map
     }
 
-    /// The depth at disparity `d`, unless it is too far.
+    /// The depth at disparity `d`, unless it is beyond the limit.
     fn depth(self, rig: &Rig, d: f64) -> Option<f64> {
         rig.depth(d).filter(|depth| self.clip_depth.is_none_or(|limit| *depth <= limit))
     }
 
-    /// `map` without disparities that are too far away.
+    /// Removes disparities beyond the depth limit from `map`.
     pub(super) fn near(self, map: Plane<f32>, rig: &Rig) -> Plane<f32> {
         if self.clip_depth.is_none() {
             return map;
@@ -54,7 +53,7 @@ impl Limits {
         map.map(|d| self.depth(rig, f64::from(*d)).map_or(f32::INFINITY, |_| *d))
     }
 
-    /// The maps in which what is not sure or too far has low confidence, and so gives no points.
+    /// The maps, with uncertain and distant pixels marked as low confidence so that they give no points.
     pub(super) fn trusted<'a>(self, maps: &'a Maps, rig: &Rig) -> Cow<'a, Maps> {
         if self.min_confidence.is_none() && self.clip_depth.is_none() {
             return Cow::Borrowed(maps);

@@ -1,4 +1,4 @@
-//! The maps of many pairs, each set named after its pair.
+//! Output files of many pairs, each set named after its pair.
 
 use std::path::Path;
 
@@ -13,12 +13,12 @@ use crate::outputs::also_args::AlsoArgs;
 use crate::outputs::files::Written;
 use crate::outputs::outcome::{Outcome, View};
 
-/// The maps to write of each pair.
+/// Flags of the maps to write for each pair.
 #[derive(clap::Args, Serialize)]
 pub(crate) struct MapArgs {
-    /// Format of the disparity maps, as the extensions of `mrfgs match` [default: pfm]
+    /// Format of the disparity maps [default: pfm]
     #[arg(long, value_enum, value_name = "WHICH")]
-    // The names of the outputs say it.
+    // Not recorded: the file names tell.
     #[serde(skip)]
     pub(crate) format: Option<Format>,
     #[command(flatten)]
@@ -27,24 +27,24 @@ pub(crate) struct MapArgs {
 }
 
 impl MapArgs {
-    /// The name of the disparity map of a pair.
+    /// The file name of a pair's disparity map.
     pub(crate) fn map(&self, name: &str) -> String {
         format!("{name}.{}", self.format.unwrap_or_default().extension())
     }
 
-    /// The wanted outputs beside it, with their names.
+    /// The selected further outputs of a pair, with their file names.
     pub(crate) fn also(&self, name: &str) -> impl Iterator<Item = (&'static Also, String)> {
         let map = self.map(name);
         self.also.wanted().map(move |word| (word, word.beside(Path::new(&map)).display().to_string()))
     }
 
-    /// Says before any computing whether those of a pair can be written to `folder`, with disparities in `range`.
+    /// Checks before any computing that the outputs of a pair can be written to `folder`, with disparities in `range`.
     pub(crate) fn check(&self, folder: &Path, name: &str, range: DisparityRange) -> mrfgs::Result<()> {
         write::check_disparity_path(&folder.join(self.map(name)), range.min, range.max)?;
         self.also(name).try_for_each(|(word, file)| word.check(&folder.join(file), range))
     }
 
-    /// Writes those of a pair to `folder`, all or none.
+    /// Writes the outputs of a pair to `folder`, all or none.
     pub(crate) fn write(&self, folder: &Path, name: &str, outcome: &Outcome) -> Result<()> {
         let map = folder.join(self.map(name));
         let mut written = Written::default();
@@ -72,7 +72,7 @@ pub(crate) enum Format {
 }
 
 impl Format {
-    /// The extension of their files, which is the word for it.
+    /// The file extension, which is also the value of the flag.
     pub(crate) fn extension(self) -> String {
         self.to_possible_value().map(|word| word.get_name().to_owned()).unwrap_or_default()
     }

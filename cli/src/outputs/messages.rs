@@ -1,4 +1,4 @@
-//! The messages of ROS 2 that a frame becomes, and their topics.
+//! ROS 2 messages of a frame, and their topics.
 
 use mrfgs::Result;
 use mrfgs::calibration::cameras::ThirdCamera;
@@ -13,11 +13,11 @@ use mrfgs_ros::messages::{
     Type, UINT8,
 };
 
-/// A topic, by what ROS usually calls it and without a namespace, and the type of its messages.
+/// A topic and its message type, with ROS's usual name and without a namespace.
 pub(crate) type Topic = (&'static str, &'static str);
 
 pub(crate) const DISPARITY: Topic = ("disparity", DisparityImage::NAME);
-/// The camera of the disparities, where nobody else tells of it.
+/// The camera of the disparities, if no one else publishes it.
 pub(crate) const CAMERA: Topic = ("left/camera_info", CameraInfo::NAME);
 pub(crate) const DEPTH: Topic = ("depth/image_rect", Image::NAME);
 pub(crate) const MILLIMETRES: Topic = ("depth/image_rect_raw", Image::NAME);
@@ -31,12 +31,12 @@ pub(crate) const POINTS: Topic = ("points2", PointCloud2::NAME);
 pub(crate) const SIGMA: Topic = ("sigma", Image::NAME);
 pub(crate) const DEPTH_SIGMA: Topic = ("depth/sigma", Image::NAME);
 
-/// The topic of a map of bytes called `name`.
+/// The topic of an 8-bit map called `name`.
 pub(crate) const fn of_bytes(name: &'static str) -> Topic {
     (name, Image::NAME)
 }
 
-/// The camera that the depths on `topic` come with; `None` for others.
+/// The camera topic that accompanies depths on `topic`; `None` for other topics.
 pub(crate) fn camera_of(topic: Topic) -> Option<Topic> {
     match topic {
         DEPTH | MILLIMETRES => Some(DEPTH_CAMERA),
@@ -45,30 +45,30 @@ pub(crate) fn camera_of(topic: Topic) -> Option<Topic> {
     }
 }
 
-/// What takes the messages of a frame.
+/// Receives the messages of a frame.
 pub(crate) trait Sink {
-    /// Takes a message of `topic`, which has this `header`.
+    /// Takes a message of `topic` with this `header`.
     ///
     /// # Errors
-    /// Where it cannot be written or sent.
+    /// If it cannot be written or sent.
     fn put(&mut self, topic: Topic, header: &Header, message: &impl Encode) -> Result<()>;
 }
 
-/// What a frame has beside its disparities.
+/// An output of a frame, besides its disparities.
 pub(crate) enum Content {
-    /// In the unit of the baseline; +infinity where there is none.
+    /// In the unit of the baseline; +infinity if unknown.
     Depth(Plane<f32>),
-    /// 0 where there is none.
+    /// 0 if unknown.
     Millimetres(Plane<u16>),
-    /// The same two in the view of a third camera.
+    /// Depths in the view of a third camera.
     Registered(Plane<f32>),
     RegisteredMillimetres(Plane<u16>),
     Points(Cloud),
-    /// Errors in pixels; +infinity where there is none.
+    /// Errors in pixels; +infinity if unknown.
     Sigma(Plane<f32>),
-    /// Errors in the unit of the baseline; +infinity where there is none.
+    /// Errors in the unit of the baseline; +infinity if unknown.
     DepthSigma(Plane<f32>),
-    /// A map of bytes, with its name.
+    /// An 8-bit map, with its name.
     Bytes(&'static str, Plane<u8>),
 }
 
@@ -78,14 +78,14 @@ pub(crate) struct Cameras {
     focal_length: [f64; 2],
     principal_point: [f64; 2],
     doffs: f64,
-    /// In metres; 0 where its unit is not known.
+    /// In metres; 0 if its unit is unknown.
     baseline: f64,
-    /// How many metres the unit is.
+    /// Metres per unit of the baseline; 0 if unknown.
     metres: f64,
 }
 
 impl Cameras {
-    /// Those of a calibration, where it says them, of maps whose first pixel is at `origin` in the left view.
+    /// The cameras of a calibration, if complete, for maps whose first pixel is at `origin` in the left view.
     pub(crate) fn of(calibration: &Calibration, origin: (usize, usize)) -> Option<Self> {
         let (camera, doffs, baseline) = (calibration.camera?, calibration.doffs?, calibration.baseline?);
         let metres = calibration.unit.millimetres().map_or(0.0, |millimetres| millimetres / 1000.0);
@@ -107,7 +107,7 @@ impl Cameras {
     }
 }
 
-/// A third camera, and the name of its frame of coordinates.
+/// A third camera, and the name of its coordinate frame.
 #[derive(Clone)]
 pub(crate) struct Third {
     pub(crate) frame_id: String,
@@ -118,7 +118,7 @@ impl Third {
     fn message(&self, header: Header) -> CameraInfo {
         let ThirdCamera { lens, size: (width, height), .. } = &self.camera;
         let ([fx, fy], [cx, cy]) = (lens.focal_length(), lens.principal_point());
-        // ROS has names for these alone.
+        // ROS has names for these models only.
         let (model, d) = match lens.distortion() {
             Distortion::RadialTangential(model) => match model.coefficients() {
                 d if d.len() > 5 => ("rational_polynomial", d),
@@ -138,7 +138,7 @@ impl Third {
     }
 }
 
-/// The messages of frames whose disparities are in `range`, and whose cameras are these where they are known.
+/// Makes the messages of frames with disparities in `range`; cameras are added if known.
 #[derive(Clone)]
 pub(crate) struct Messages {
     range: DisparityRange,
@@ -147,13 +147,12 @@ pub(crate) struct Messages {
 }
 
 impl Messages {
-    /// Depths may be those of a `third` camera, too.
+    /// With a `third` camera, depths may be in its view.
     pub(crate) fn new(range: DisparityRange, cameras: Option<Cameras>, third: Option<Third>) -> Self {
         Self { range, cameras, third }
     }
 
-    /// The disparities of a frame. The left view has this `header`, and disparities have this error (sigma, in pixels), where it is
-    /// known.
+    /// The disparity message of a frame; `header` is that of the left view, `sigma` the typical error in pixels, if known.
     pub(crate) fn disparity<'a>(
         &self,
         header: &Header,
@@ -165,15 +164,15 @@ impl Messages {
         DisparityImage { delta_d, ..disparity }
     }
 
-    /// The camera of maps of this `size`, where it is known.
+    /// The camera message for maps of this `size`, if the cameras are known.
     pub(crate) fn camera(&self, header: &Header, size: (usize, usize)) -> Option<CameraInfo> {
         self.cameras.as_ref().map(|cameras| cameras.message(header, size))
     }
 
-    /// Hands the disparities of a frame, its camera and its `contents` to `sink`.
+    /// Passes the disparities of a frame, its camera and its `contents` to `sink`.
     ///
     /// # Errors
-    /// Those of the sink.
+    /// Errors of the sink.
     pub(crate) fn put_frame(
         &self,
         header: &Header,
@@ -189,12 +188,12 @@ impl Messages {
         self.put(header, contents, sink)
     }
 
-    /// Hands what a frame has beside its disparities to `sink`.
+    /// Passes the further outputs of a frame to `sink`.
     ///
     /// # Errors
-    /// Those of the sink.
+    /// Errors of the sink.
     pub(crate) fn put(&self, header: &Header, contents: Vec<Content>, sink: &mut impl Sink) -> Result<()> {
-        // Both are checked before: such contents come with a known unit.
+        // Callers have checked that the cameras and the unit are known if these outputs need them.
         let metres = self.cameras.as_ref().map_or(1.0, |cameras| cameras.metres);
         let of_third =
             |content: &Content| matches!(content, Content::Registered(_) | Content::RegisteredMillimetres(_));
@@ -233,12 +232,12 @@ fn in_metres(v: f32, metres: f64) -> f32 {
     (f64::from(v) * metres) as f32
 }
 
-/// `map` in another unit, and not a number where there is nothing.
+/// Scales `map` to another unit; unknown values become NaN.
 fn known(map: &Plane<f32>, unit: f64) -> Plane<f32> {
     map.map(|v| if v.is_finite() { in_metres(*v, unit) } else { f32::NAN })
 }
 
-/// The map as ROS has it: shifted so that depth is focal length times baseline by disparity, and below the range where it is invalid.
+/// A disparity message: shifted so that depth = focal length x baseline / disparity; invalid pixels lie below the range.
 fn disparity<'a>(
     header: &Header,
     map: &Plane<f32>,
@@ -291,7 +290,7 @@ fn image(
     }
 }
 
-/// Position, colours as PCL packs them, and confidence, in 20 bytes.
+/// 20 bytes per point: position, colour packed as in PCL, and confidence.
 fn points(header: &Header, cloud: &Cloud, metres: f64) -> PointCloud2 {
     let field = |name, offset, datatype| PointField { name, offset, datatype };
     let mut data = Vec::with_capacity(20 * cloud.points.len());

@@ -1,4 +1,4 @@
-//! Outputs: all checked before any computing, and all written or none left behind.
+//! Outputs: all are checked before any computing, and all are written or none.
 
 pub(crate) mod also;
 mod also_args;

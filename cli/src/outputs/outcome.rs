@@ -1,4 +1,4 @@
-//! What a match has found, as outputs need it.
+//! The result of a match, for its outputs.
 
 use mrfgs::calibration::cameras::ThirdCamera;
 use mrfgs::calibration::matrix::Matrix;
@@ -12,46 +12,46 @@ use mrfgs::sigma::Sigma;
 use crate::args::Sign;
 use crate::outputs::limits::Limits;
 
-/// The view whose pixels a map has.
+/// The view that a map belongs to.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum View {
     Left,
     Right,
 }
 
-/// What an error is of.
+/// The quantity that an error belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Of {
     Disparities,
     Depths,
 }
 
-/// What a match has found, for its outputs.
+/// The result of a match, for its outputs.
 pub(crate) struct Outcome<'a> {
     pub(crate) maps: &'a Maps,
     pub(crate) range: DisparityRange,
     pub(crate) sign: Sign,
-    /// The left image, where an output shows it.
+    /// The left image, if an output shows it.
     pub(crate) left: Option<&'a Image>,
-    /// The cameras, where an output takes them.
+    /// The cameras, if an output needs them.
     pub(crate) rig: Option<Rig>,
-    /// The rotation from the frame of the left camera to the rectified one, where the images were rectified.
+    /// The rotation from the left camera's frame to the rectified frame, if the images were rectified.
     pub(crate) rectifying: Option<Matrix>,
-    /// The camera that an output is in the view of.
+    /// The camera of `--into`.
     pub(crate) third: Option<ThirdCamera>,
-    /// How the errors follow from the confidence, where a match found the maps.
+    /// Computes errors from confidences, if the maps come from a match.
     pub(crate) sigma: Option<Sigma>,
-    /// The georeferences of the views.
+    /// The georeferences of both views.
     pub(crate) georeferences: [Option<Georeference>; 2],
 }
 
 impl Outcome<'_> {
-    /// The disparity map, without what is not sure.
+    /// The disparity map without uncertain pixels.
     pub(crate) fn final_map(&self, limits: Limits) -> Plane<f32> {
         limits.sure(self.maps.final_map(), self.maps)
     }
 
-    /// The errors of what is sure: `None` where they are not known, or those of depths are wanted without cameras.
+    /// Expected errors of the remaining pixels; `None` if unknown, or for depths without cameras.
     pub(super) fn sigmas(&self, of: Of, limits: Limits) -> Option<Plane<f32>> {
         let (mut map, sigmas) = (self.final_map(limits), self.sigma?.map(self.maps));
         if let Some(rig) = &self.rig {
@@ -67,7 +67,7 @@ impl Outcome<'_> {
         }
     }
 
-    /// The median of the errors of all measured disparities; `None` where none is, or errors are not known.
+    /// The median error of all measured disparities; `None` without any, or if errors are unknown.
     pub(crate) fn typical_sigma(&self) -> Option<f32> {
         let mut sigmas = self.sigma?.map(self.maps).into_data();
         sigmas.retain(|sigma| sigma.is_finite());
@@ -75,7 +75,7 @@ impl Outcome<'_> {
         Some(*sigmas.select_nth_unstable_by(middle, f32::total_cmp).1)
     }
 
-    /// What writes a map with the pixels of `view`.
+    /// Writes maps with the georeference of `view`.
     pub(crate) fn writer(&self, view: View) -> Writer {
         Writer { georeference: self.georeferences[view as usize].clone() }
     }

@@ -1,4 +1,4 @@
-//! What ran and what it found, in JSON: `mrfgs match --json` and the records of a batch.
+//! Records of a match in JSON, for `mrfgs match --json` and batches.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -12,14 +12,14 @@ use serde::Serialize;
 use crate::args::Sign;
 use crate::remedy;
 
-/// The inputs of a match and its map, as the user wrote them.
+/// The paths of a match, as the user wrote them.
 #[derive(Serialize)]
 pub(crate) struct Files {
     pub(crate) left: String,
     pub(crate) right: String,
     pub(crate) mask: Option<String>,
     pub(crate) calibration: Option<String>,
-    /// None where no map is written.
+    /// `None` if no map is written.
     pub(crate) output: Option<String>,
 }
 
@@ -28,12 +28,12 @@ pub(crate) struct Files {
 pub(crate) struct MatchRecord<'a> {
     version: &'static str,
     files: &'a Files,
-    /// Whether the images were rectified before.
+    /// Whether the images were rectified first.
     pub(crate) rectified: bool,
-    /// The first column and row of the maps in the left view, where they are of a region.
+    /// First column and row of the maps in the left view, for a region.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) region: Option<[usize; 2]>,
-    /// How far that can be trusted, where it was by matches alone.
+    /// The quality of a rectification without a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) trust: Option<Trust>,
     width: usize,
@@ -46,13 +46,13 @@ pub(crate) struct MatchRecord<'a> {
     driver: Option<&'a str>,
     note: Option<String>,
     tiles: usize,
-    /// How far the right view was moved up, in pixels.
+    /// How far the right view was shifted up, in pixels.
     moved_up: f64,
-    /// By how much the left and the right view were smoothed, in pixels.
+    /// How much the left and the right view were smoothed, in pixels.
     smoothed: [f64; 2],
     iterations: u32,
     seconds: f64,
-    /// Milliseconds by stage and level, where they were measured.
+    /// Milliseconds by stage and level, if measured.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     stages: BTreeMap<String, f64>,
     density: f64,
@@ -102,7 +102,7 @@ impl<'a> MatchRecord<'a> {
     }
 }
 
-/// The name of what was timed: "dependency, level 0".
+/// The name of a timing: "dependency, level 0".
 pub(crate) fn stage_and_level(timing: &Timing) -> String {
     let level = timing.level.map_or(String::new(), |z| format!(", level {z}"));
     format!("{}{level}", timing.stage)

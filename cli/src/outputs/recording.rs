@@ -1,4 +1,4 @@
-//! Recordings of maps: MCAP files with the messages of ROS 2.
+//! Recordings of maps: MCAP files with ROS 2 messages.
 
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use mrfgs_ros::recording::Writer;
 
 use crate::outputs::messages::{Content, Messages, Sink, Topic};
 
-/// A recording in the making. The file appears when it is [finished](Self::finish).
+/// A recording being written. The file appears on [`finish`](Self::finish).
 pub(crate) struct RecordedMaps {
     messages: Messages,
     file: File,
@@ -25,21 +25,21 @@ struct File {
 }
 
 impl RecordedMaps {
-    /// One at `path`, of these `messages`.
+    /// Starts a recording at `path`.
     ///
     /// # Errors
-    /// [`Error::Write`] where it cannot be written.
+    /// [`Error::Write`] if it cannot be written.
     pub(crate) fn new(path: &Path, messages: Messages) -> Result<Self> {
         write::check_path(path)?;
         let file = File { path: path.to_owned(), writer: None };
         Ok(Self { messages, file })
     }
 
-    /// Adds the disparities of a frame, its camera and its `contents`. The left view has this `header`, and disparities have this error
-    /// (sigma, in pixels), where it is known.
+    /// Adds the disparities of a frame, its camera and its `contents`; `header` is that of the left view, `sigma` the typical error in
+    /// pixels, if known.
     ///
     /// # Errors
-    /// [`Error::Write`] where it cannot be written.
+    /// [`Error::Write`] if it cannot be written.
     pub(crate) fn add(
         &mut self,
         header: &Header,
@@ -53,7 +53,7 @@ impl RecordedMaps {
     /// Ends the recording, with its index.
     ///
     /// # Errors
-    /// [`Error::Write`] where it cannot be written.
+    /// [`Error::Write`] if it cannot be written.
     pub(crate) fn finish(self) -> Result<()> {
         let File { path, writer } = self.file;
         let Some(writer) = writer else { return Ok(()) };

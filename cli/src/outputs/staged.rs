@@ -1,4 +1,4 @@
-//! Folders that appear as a whole.
+//! Folders that appear complete or not at all.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,8 +10,7 @@ use crate::failure::{self, Failure};
 use crate::outputs::claim::{Claim, FOLDERS};
 use crate::outputs::files::{check_json_path, folder_place, json_file, parent};
 
-/// A folder in the making, beside the place that it takes once it is whole. If it is dropped before, it is removed with all it
-/// holds; if the program is killed, the next run that makes the folder removes it.
+/// A folder being written, moved to its place once complete. Dropped earlier, it is removed; after a killed run, the next one removes it.
 pub(crate) struct StagedFolder {
     /// As the user wrote it.
     name: PathBuf,
@@ -20,11 +19,11 @@ pub(crate) struct StagedFolder {
 }
 
 impl StagedFolder {
-    /// Begins the folder `name`, which may be there already.
+    /// Begins the folder `name`, which may exist.
     pub(crate) fn new(name: &Path) -> Result<Self> {
         let place = folder_place(name)?;
         let (Some(beside), Some(last)) = (place.parent(), place.file_name()) else {
-            return Err(Error::write(name, Reason::of_request("has no name; give the name of a folder")));
+            return Err(Error::write(name, Reason::of_request("has no name; give a folder")));
         };
         let staging = Claim::new(beside, last).map_err(|e| match e {
             Error::Write { reason, .. } => {
@@ -34,7 +33,7 @@ impl StagedFolder {
             other => other,
         })?;
         let staging = staging.ok_or_else(|| {
-            Error::write(name, "another run is writing it; wait for that, or give another name")
+            Error::write(name, "another run is writing it; wait until it ends, or give another name")
         })?;
         let staged = Self { name: name.to_owned(), place, staging };
         fs::create_dir(staged.path()).map_err(|e| Error::write(name, e))?;
@@ -45,39 +44,39 @@ impl StagedFolder {
     pub(crate) fn new_or_empty(name: &Path) -> Result<Self> {
         let staged = Self::new(name)?;
         match fs::read_dir(&staged.place).map(|mut entries| entries.next().is_none()) {
-            Ok(false) => Err(staged.error("the folder is not empty; name a new one")),
+            Ok(false) => Err(staged.error("the folder is not empty; give a new one")),
             _ => Ok(staged),
         }
     }
 
-    /// Refuses JSON that cannot be written, or lies in the folder, which is replaced as a whole; `flag` names the folder.
+    /// Refuses JSON that cannot be written or lies in the folder, which is replaced as a whole; `flag` names the folder.
     pub(crate) fn check_json(&self, flag: &str, json: Option<&Path>) -> Result<(), Failure> {
         check_json_path(json)?;
         let Some(path) = json_file(json) else { return Ok(()) };
         let beside = fs::canonicalize(parent(path));
         if path == self.place || beside.is_ok_and(|parent| parent.starts_with(&self.place)) {
-            let reason = format!("{} lies in the folder of {flag}; give another name", path.display());
+            let reason = format!("{} is inside the folder of {flag}; give another path", path.display());
             return Err(Failure::usage("--json", reason));
         }
         Ok(())
     }
 
-    /// An error of the folder.
+    /// A write error that names the folder.
     pub(crate) fn error(&self, reason: impl Into<Reason>) -> Error {
         Error::write(&self.name, reason)
     }
 
-    /// Where it will be.
+    /// The final path.
     pub(crate) fn place(&self) -> &Path {
         &self.place
     }
 
-    /// Where it is made.
+    /// The temporary path.
     pub(crate) fn path(&self) -> PathBuf {
         self.staging.folder().join(FOLDERS[0])
     }
 
-    /// An error that names a file in the making as one that names the folder.
+    /// Makes an error about a temporary file name the folder.
     pub(crate) fn named(&self, error: Error) -> Error {
         match &error {
             Error::Write { path, .. } if path.starts_with(self.staging.folder()) => {
@@ -87,7 +86,7 @@ impl StagedFolder {
         }
     }
 
-    /// Puts it in its place; what was there goes, and comes back when that fails.
+    /// Moves the folder to its place. If that fails, the old folder is restored.
     pub(crate) fn publish(self) -> Result<()> {
         let error = |e: std::io::Error| self.error(e);
         let old = self.staging.folder().join(FOLDERS[1]);

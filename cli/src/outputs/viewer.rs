@@ -1,4 +1,4 @@
-//! Maps for Foxglove, while they come.
+//! Live maps for Foxglove.
 
 use mrfgs::image::Plane;
 use mrfgs::{Error, Result};
@@ -7,24 +7,24 @@ use mrfgs_ros::messages::{Encode, Header};
 
 use crate::outputs::messages::{Content, Messages, Sink, Topic};
 
-/// Shows maps to whoever connects.
+/// Shows maps to connected viewers.
 pub(crate) struct ShownMaps {
     messages: Messages,
     viewer: Viewer,
 }
 
 impl ShownMaps {
-    /// These `messages`, at `address`.
+    /// Serves these `messages` at `address`.
     ///
     /// # Errors
-    /// [`Error::Write`] where nobody can listen there.
+    /// [`Error::Write`] if it cannot listen there.
     pub(crate) fn new(address: &str, messages: Messages) -> Result<Self> {
         let viewer =
             Viewer::new(address).map_err(|reason| Error::write(format!("ws://{address}"), reason))?;
         Ok(Self { messages, viewer })
     }
 
-    /// Where Foxglove connects.
+    /// The URL for Foxglove.
     pub(crate) fn address(&self) -> String {
         format!("ws://{}", self.viewer.address())
     }
@@ -32,7 +32,7 @@ impl ShownMaps {
     /// Shows what [`RecordedMaps::add`](super::RecordedMaps::add) writes.
     ///
     /// # Errors
-    /// None: viewers come and go.
+    /// Never fails: viewers may come and go.
     pub(crate) fn add(
         &mut self,
         header: &Header,

@@ -1,4 +1,4 @@
-//! Folders with a pair and its ground truth, in the layouts of the Middlebury sets.
+//! Folders with a pair and its ground truth, in the layouts of the Middlebury data sets.
 
 use std::path::{Path, PathBuf};
 
@@ -9,16 +9,16 @@ use mrfgs::{Error, Result};
 
 use crate::args::{calibrated_range, disparity};
 
-/// What a folder holds.
+/// The file layout of a data set.
 struct Layout {
-    /// Left view, right view and truth of the left one.
+    /// Left view, right view and ground truth of the left view.
     files: [&'static str; 3],
-    /// How many levels of an 8-bit truth are one pixel, unless the user gives a scale; `None` where the truth is in pixels
-    /// and a calib.txt gives the range.
+    /// Grey levels per pixel of disparity in an 8-bit ground truth, unless the user gives a scale; `None` if the truth is in pixels and a
+    /// calib.txt gives the range.
     scale: Option<f32>,
 }
 
-/// The layout of a folder is the first of these of which it holds most.
+/// All layouts. A folder has the one of which it holds most files, the first on ties.
 const LAYOUTS: [Layout; 3] = [
     Layout { files: ["im0.png", "im1.png", "disp0GT.pfm"], scale: None },
     // 2005 and 2006, third size.
@@ -29,11 +29,11 @@ const LAYOUTS: [Layout; 3] = [
 
 pub(crate) const CALIBRATION: &str = "calib.txt";
 
-/// The mask's name in any of them, which may lack it.
+/// The file name of the optional mask, in every layout.
 const MASK: &str = "mask0nocc.png";
 
 impl Layout {
-    /// The files that must be there, with the truth or without.
+    /// The files that must exist, with or without the ground truth.
     fn required(&self, truth: bool) -> impl Iterator<Item = &'static str> {
         let [left, right, known] = self.files;
         let known = truth.then_some(known);
@@ -41,19 +41,19 @@ impl Layout {
     }
 }
 
-/// A folder to match, with all that it must hold.
+/// A folder that contains every file it needs.
 pub(crate) struct Folder<'a> {
     dir: &'a Path,
     layout: &'static Layout,
 }
 
 impl<'a> Folder<'a> {
-    /// Finds the layout of `dir`, which is to be evaluated; the error names what is missing.
+    /// Detects the layout of `dir` for an evaluation; the error names a missing file.
     pub(crate) fn of(dir: &'a Path) -> Result<Self> {
         Self::holding(dir, "to evaluate", |_| true)
     }
 
-    /// As [`Folder::of`], for a folder that is only matched: it needs no truth if a calib.txt gives the range.
+    /// Like [`Folder::of`], for a match: the ground truth is not needed if a calib.txt gives the range.
     pub(crate) fn to_match(dir: &'a Path) -> Result<Self> {
         let calibrated = dir.join(CALIBRATION).is_file();
         Self::holding(dir, "to match", |layout| layout.scale.is_some() && !calibrated)
@@ -68,18 +68,18 @@ impl<'a> Folder<'a> {
                 0 => LAYOUTS.iter().map(described).collect::<Vec<_>>().join("; or "),
                 _ => described(layout),
             };
-            let reason = format!("there is no such file; a folder {purpose} holds {expected}");
+            let reason = format!("there is no such file; a folder {purpose} must contain {expected}");
             return Err(Error::read(dir.join(missing), reason));
         }
         Ok(Self { dir, layout })
     }
 
-    /// Whether its truth has 8 bits and a scale.
+    /// Whether its ground truth has 8 bits and a scale.
     pub(crate) fn is_scaled(&self) -> bool {
         self.layout.scale.is_some()
     }
 
-    /// Reads it all by `reader`; `scale` replaces that of the layout.
+    /// Reads all files; `scale` overrides that of the layout.
     pub(crate) fn read(&self, reader: Reader, scale: Option<f32>) -> Result<Scene> {
         let calibrated = self.calibrated()?;
         let pair = self.views(reader)?;
@@ -88,7 +88,7 @@ impl<'a> Folder<'a> {
         Ok(Scene { name: name(self.dir), pair, range, ground })
     }
 
-    /// Reads the pair and the range, and of the truth no more than the range takes.
+    /// Reads the pair and the range; reads the ground truth only if the range depends on it.
     pub(crate) fn read_pair(&self, reader: Reader) -> Result<(Pair, DisparityRange)> {
         let calibrated = self.calibrated()?;
         let pair = self.views(reader)?;
@@ -97,14 +97,14 @@ impl<'a> Folder<'a> {
         Ok((pair, range))
     }
 
-    /// The range that a calib.txt gives, where there is one.
+    /// The range in calib.txt, if that exists.
     fn calibrated(&self) -> Result<Option<DisparityRange>> {
         let calib = self.dir.join(CALIBRATION);
         if !calib.is_file() {
             return Ok(None);
         }
         let range = calibrated_range(&calib, &Calibration::read(&calib)?, 0)?;
-        let silent = || Error::read(&calib, "does not say ndisp, the number of disparities; add ndisp=N");
+        let silent = || Error::read(&calib, "lacks ndisp, the number of disparities; add ndisp=N");
         range.ok_or_else(silent).map(Some)
     }
 
@@ -127,23 +127,23 @@ impl<'a> Folder<'a> {
     }
 }
 
-/// The name of the folder `dir`, however its path is spelt.
+/// The name of the folder `dir`, also for paths such as `.`.
 pub(crate) fn name(dir: &Path) -> String {
     let full = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
     full.file_name().unwrap_or(dir.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// Every file that may be read of `dir`.
+/// Every file in `dir` that may be read.
 pub(crate) fn inputs(dir: &Path) -> impl Iterator<Item = PathBuf> {
     LAYOUTS.iter().flat_map(|layout| layout.files).chain([CALIBRATION, MASK]).map(|file| dir.join(file))
 }
 
-/// The same of several.
+/// Every file in several folders that may be read.
 pub(crate) fn inputs_of(dirs: &[PathBuf]) -> impl Iterator<Item = PathBuf> {
     dirs.iter().flat_map(|dir| inputs(dir))
 }
 
-/// One folder, read.
+/// The contents of a folder.
 pub(crate) struct Scene {
     pub(crate) name: String,
     pub(crate) pair: Pair,
@@ -151,13 +151,13 @@ pub(crate) struct Scene {
     pub(crate) ground: GroundTruth,
 }
 
-/// From 0 to the largest known disparity, rounded up.
+/// The range from 0 to the largest known disparity, rounded up.
 fn range_of(ground: &GroundTruth) -> Result<DisparityRange> {
     let known = ground.truth().data().iter().copied().filter(|d| d.is_finite());
     DisparityRange::new(0, known.fold(0.0, f32::max).ceil() as i32)
 }
 
-/// The truth, of whole numbers where it has a `scale`, and the mask for `what`, which is of the given size.
+/// Reads the ground truth, of integers if it has a `scale`, and the mask. Both must have the `size` of the image `what`.
 pub(crate) fn ground_truth(
     reader: Reader,
     truth: &Path,
@@ -182,7 +182,7 @@ pub(crate) fn ground_truth(
     let plane = disparity(reader, truth, scale)?;
     let plane = fits(plane, truth, what, size)?;
     if !plane.data().iter().any(|d| d.is_finite()) {
-        return Err(Error::read(truth, "holds no known disparity; nothing can be compared with it"));
+        return Err(Error::read(truth, "contains no known disparity, so nothing can be compared with it"));
     }
     let mask = mask.map(|path| fits(reader.grey8(path)?, path, what, size)).transpose()?;
     GroundTruth::new(plane, mask)

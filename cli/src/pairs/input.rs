@@ -1,4 +1,4 @@
-//! A pair with its range and its cameras, as `mrfgs match`, `mrfgs inspect` and `mrfgs sequence` take it.
+//! A pair with its range and cameras, for `mrfgs match`, `inspect`, `sequence` and `ros`.
 
 use std::path::{Path, PathBuf};
 
@@ -13,42 +13,42 @@ use mrfgs::rectification::{Doubt, Options, Rectification, Trust};
 use mrfgs::region::Region;
 use mrfgs::{Error, Matched};
 
-use crate::args::{CameraArgs, CropArgs, Found, ReadingArgs, Search, Sign, shown};
+use crate::args::{CameraArgs, CropArgs, ReadingArgs, ResolvedRange, Search, Sign, shown};
 use crate::console;
 use crate::failure::{self, Failure, Result};
-use crate::matching::Searched;
+use crate::matching::SearchSpace;
 use crate::outputs::{Also, Files};
 use crate::pairs::folder::CALIBRATION;
 use crate::pairs::list;
 use crate::remedy;
 
-/// The files of a pair, and how they are read.
+/// The files of a pair, and how to read them.
 #[derive(clap::Args)]
 pub(crate) struct PairArgs {
-    /// Left image, the reference view; or a file with both views, MPO or JPS, without RIGHT
+    /// Left image, the reference view; or one file with both views (MPO, JPS), without RIGHT
     pub(crate) left: PathBuf,
-    /// Right image, of the same size and rectified, so that matches are on the same row
+    /// Right image, of the same size; rectified, so that matching points are in the same row, unless --rectify is given
     pub(crate) right: Option<PathBuf>,
 
     #[command(flatten)]
     pub(crate) search: Search,
-    /// Calibration: the range (ndisp of a calib.txt), and the cameras for depth and points; of OpenCV, ROS (two files, each
-    /// with --calib), Kalibr, KITTI, Middlebury and others [default: a calib.txt beside LEFT]
+    /// Calibration, for the range (ndisp of a calib.txt) and for depth and points. OpenCV, ROS (two files, each with --calib), Kalibr,
+    /// KITTI, Middlebury and others [default: a calib.txt beside LEFT]
     #[arg(long, value_name = "FILE")]
     pub(crate) calib: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) crop: CropArgs,
-    /// Image of the size of LEFT: where it is not black, LEFT is ignored and the maps are invalid
+    /// Mask of the size of LEFT: pixels that are not black are ignored and invalid in the maps
     #[arg(long, value_name = "FILE")]
     pub(crate) mask: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) reading: ReadingArgs,
 }
 
-/// A calibration: its files, or texts that stand in for them, each with a name.
+/// A calibration: files, or texts with names that replace them.
 #[derive(Clone, Copy)]
 pub(crate) enum Calib<'a> {
-    /// Of these, the images show a part where one is given.
+    /// Calibration files, with the crop that the images show.
     Files(&'a [PathBuf], &'a CropArgs),
     Texts(&'a [(PathBuf, String)]),
 }
@@ -58,7 +58,7 @@ impl Calib<'_> {
         self.names().is_empty()
     }
 
-    /// What messages call it.
+    /// The names for messages.
     fn names(self) -> Vec<PathBuf> {
         match self {
             Self::Files(files, _) => files.to_vec(),
@@ -86,34 +86,34 @@ impl Calib<'_> {
     }
 }
 
-/// A pair, read.
+/// A pair with its range and calibration.
 pub(crate) struct Input {
     pub(crate) pair: Pair,
     pub(crate) range: DisparityRange,
-    /// Whether sparse matches gave the range.
+    /// Whether the range was estimated from sparse matches.
     by_matches: bool,
     /// The calibration of the rectified pair.
-    calibration: Option<Known>,
-    /// Whether the range is one of depths.
+    calibration: Option<KnownCalibration>,
+    /// Whether the range was given as depths.
     by_depth: bool,
-    /// How to give one.
+    /// How to give a calibration, for messages.
     remedy: &'static str,
-    /// What has rectified the pair, where it was not.
+    /// The rectification applied to the pair, if there was one.
     pub(crate) rectification: Option<Rectification>,
 }
 
-/// The flag that messages name where the numbers of the cameras are given.
+/// Stands for the file name in messages if flags give the cameras.
 pub(crate) const NUMBERS: &str = "--focal";
 
-/// A calibration of a rectified pair, and where it comes from.
-struct Known {
-    /// None where flags give its numbers.
+/// A calibration of a rectified pair, and its origin.
+struct KnownCalibration {
+    /// Empty if flags give the cameras.
     files: Vec<PathBuf>,
     calibration: Calibration,
 }
 
-impl Known {
-    /// With the file that messages name.
+impl KnownCalibration {
+    /// The calibration with the file name for messages.
     fn named(&self) -> (&Path, &Calibration) {
         (self.files.first().map_or(Path::new(NUMBERS), PathBuf::as_path), &self.calibration)
     }
@@ -124,9 +124,8 @@ impl Known {
 }
 
 impl PairArgs {
-    /// Reads the images and what the range takes, and the cameras where `cameras` asks for them, unless the user gives their
-    /// `numbers`. The user counts disparities by `sign`. With `rectify`, the images are as the cameras took them, and are rectified:
-    /// by the calibration, or without one by their own matches.
+    /// Reads the images, the range and, if `cameras` asks for them, the cameras, unless flags (`numbers`) give those. The user counts
+    /// disparities by `sign`. With `rectify`, raw images are rectified by the calibration, or without one from their own matches.
     pub(crate) fn read(
         &self,
         sign: Sign,
@@ -151,7 +150,7 @@ impl PairArgs {
         Input::new(pair, &self.search, sign, Calib::Files(&self.calib, &self.crop), numbers, rectify, beside)
     }
 
-    /// Puts what follows the views in its place: see [`behind_views`].
+    /// Assigns the positional arguments: see [`behind_views`].
     pub(crate) fn leave(&mut self, next: &mut Option<PathBuf>) -> Result<()> {
         behind_views(&self.left, &mut self.right, next)
     }
@@ -185,9 +184,8 @@ impl PairArgs {
 }
 
 impl Input {
-    /// `pair` with what the user says of it: the range to `search`, counted by `sign`, the `calib` or the `numbers` of the
-    /// cameras, and with `rectify` that it is as the cameras took it. Without both the calibration is that `beside` a left image,
-    /// where it is given.
+    /// Resolves the range to `search` (counted by `sign`) and the calibration of `pair`: that of `calib`, else of the flags (`numbers`),
+    /// else of the calib.txt `beside` the left image if given. With `rectify`, rectifies the pair by `calib`.
     pub(crate) fn new(
         mut pair: Pair,
         search: &Search,
@@ -203,24 +201,24 @@ impl Input {
             let by;
             (by, pair) = self::rectify(&calib.read()?, &files, &pair, options)?;
             let calibration = rectification.insert(by).calibration()?;
-            Some(Known { files, calibration })
+            Some(KnownCalibration { files, calibration })
         } else if !calib.is_empty() {
             let calibration = of_rectified(&calib.read()?, &files, pair.size())?;
-            Some(Known { files, calibration })
+            Some(KnownCalibration { files, calibration })
         } else if let Some(calibration) = numbers.and_then(|numbers| numbers.calibration(pair.size())) {
-            Some(Known { files, calibration })
+            Some(KnownCalibration { files, calibration })
         } else if let Some(left) = beside {
             let files = self::beside(left);
-            // A part is said of a calibration that is given alone.
+            // --calib-crop only applies to --calib.
             let whole = CropArgs::default();
             let read = |files: &Vec<PathBuf>| of_rectified_images(files, &whole, pair.size());
             let calibration = files.as_ref().map(read).transpose()?;
-            files.zip(calibration).map(|(files, calibration)| Known { files, calibration })
+            files.zip(calibration).map(|(files, calibration)| KnownCalibration { files, calibration })
         } else {
             None
         };
-        let known = calibration.as_ref().map(Known::named);
-        let Found { range, by_matches } = search.range(&pair, known, sign)?;
+        let known = calibration.as_ref().map(KnownCalibration::named);
+        let ResolvedRange { range, by_matches } = search.range(&pair, known, sign)?;
         let remedy = match numbers {
             Some(_) => "give one with --calib, or --focal and --baseline",
             None => "give one with --calib",
@@ -229,9 +227,9 @@ impl Input {
         Ok(Self { pair, range, by_matches, calibration, by_depth, remedy, rectification })
     }
 
-    /// `pair`, which `by` has rectified by its own matches, with the range to `search`, counted by `sign`.
+    /// The input for a pair that `by` rectified without a calibration, with the range to `search`, counted by `sign`.
     fn rectified_alone(pair: Pair, by: Rectification, search: &Search, sign: Sign) -> Result<Self> {
-        let Found { range, by_matches } = search.range(&pair, None, sign)?;
+        let ResolvedRange { range, by_matches } = search.range(&pair, None, sign)?;
         let (rectification, remedy) = (Some(by), "give one with --calib");
         Ok(Self { pair, range, by_matches, by_depth: false, calibration: None, remedy, rectification })
     }
@@ -241,10 +239,10 @@ impl Input {
         self.calibration.as_ref().filter(|known| !known.is_of_flags()).map(|known| shown(&known.files))
     }
 
-    /// What is matched for the region `part` of the left view.
+    /// The region to match for the crop `part` of the left view.
     ///
     /// # Errors
-    /// Where it is not inside the view.
+    /// If it is not inside the view.
     pub(crate) fn region(&self, part: &Rect) -> Result<Region> {
         let region = Region::new(part.clone(), self.pair.size(), self.range);
         region.map_err(|e| Failure::usage("--roi", e))
@@ -255,7 +253,7 @@ impl Input {
         self.calibration.as_ref().map(|known| &known.calibration)
     }
 
-    /// The unit of depths, for people, where there is a calibration.
+    /// The unit of depths for messages; `None` without a calibration.
     pub(crate) fn unit(&self) -> Option<String> {
         self.calibration.as_ref().map(|known| {
             let by = known.named().0;
@@ -263,22 +261,23 @@ impl Input {
         })
     }
 
-    /// The cameras for the output `word`, if there is one; the left image is `left`.
+    /// The cameras for the output `word`, if there is one; `left` is the path of the left image.
     pub(crate) fn rig(&self, word: Option<&Also>, left: &Path) -> Result<Option<Rig>> {
         if let Some(known) = self.calibration.as_ref().filter(|known| known.is_of_flags()) {
             let Some(word) = word else {
                 if self.by_depth {
                     return Ok(None);
                 }
-                let reason = "is for depth and points; add --also depth or --also points, or leave it out";
+                let reason =
+                    "is only used for depth and points; add --also depth or --also points, or remove it";
                 return Err(Failure::usage("--focal", reason));
             };
             if word.takes_unit() && known.calibration.unit.millimetres().is_none() {
-                let reason = "takes the unit of the baseline; give it with the number: --baseline 120mm, 12cm or 0.12m";
+                let reason = "needs the unit of the baseline; add it: --baseline 120mm, 12cm or 0.12m";
                 return Err(Failure::usage(word.flag(), reason));
             }
         }
-        let known = self.calibration.as_ref().map(Known::named);
+        let known = self.calibration.as_ref().map(KnownCalibration::named);
         let found = word.map(|word| rig(word, known, left, self.pair.size(), self.remedy)).transpose()?;
         Ok(match self.rectifying() {
             Some(rectifying) => found.map(|rig| rig.rectified_by(&rectifying)),
@@ -286,7 +285,7 @@ impl Input {
         })
     }
 
-    /// The rotation from the frame of the left camera to the rectified one, where the pair was rectified.
+    /// The rotation from the left camera's frame to the rectified frame, if the pair was rectified.
     pub(crate) fn rectifying(&self) -> Option<Matrix> {
         self.rectification.as_ref().map(|by| by.rotations()[0])
     }
@@ -296,7 +295,7 @@ impl Input {
         self.by_matches
     }
 
-    /// Says which range was found, if the user gave none; `place` is where, if not in the pair.
+    /// Prints the range if it was estimated; `place` says in which frame.
     pub(crate) fn say_range(&self, sign: Sign, place: &str) {
         if self.by_matches {
             let DisparityRange { min, max } = sign.range(self.range);
@@ -306,12 +305,12 @@ impl Input {
         }
     }
 
-    /// What is searched, where a range that `fits` can be written.
-    pub(crate) fn searched(&self, fits: impl Fn(DisparityRange) -> bool) -> Searched<'_> {
-        Searched::new(self.range, self.by_matches, fits)
+    /// The search space; it may be widened to a range that `fits` the outputs.
+    pub(crate) fn searched(&self, fits: impl Fn(DisparityRange) -> bool) -> SearchSpace<'_> {
+        SearchSpace::new(self.range, self.by_matches, fits)
     }
 
-    /// Says so where a range that was found became the wider one of `matched`.
+    /// Prints the range if the match has widened it; `place` says in which frame.
     pub(crate) fn say_wider(&self, matched: &Matched, sign: Sign, place: &str) {
         if matched.range() != self.range {
             let DisparityRange { min, max } = sign.range(matched.range());
@@ -321,7 +320,7 @@ impl Input {
         }
     }
 
-    /// Says what is probably wrong with the pair, or with what is matched of it for a `region`.
+    /// Prints warnings about the pair, or about its `region`.
     pub(crate) fn warn(&self, region: Option<&Region>) {
         if let Some(trust) = self.rectification.as_ref().and_then(Rectification::trust) {
             console::say(&trusted(trust));
@@ -333,7 +332,7 @@ impl Input {
         }
     }
 
-    /// What is probably wrong with the pair and its calibration, in these `words`.
+    /// Warnings about the pair and its calibration, in the vocabulary `words`.
     pub(crate) fn warnings(&self, words: &remedy::Vocabulary) -> Vec<String> {
         self.warnings_of(&self.pair, words)
     }
@@ -346,7 +345,7 @@ impl Input {
         } else if let Some(known) = &self.calibration {
             said.extend(doubts_of(known.named(), self.pair.size()));
         }
-        // A range that was found does not show what the user knows.
+        // Check the range only if the user chose it; an estimated one says nothing about the pair.
         let warnings = check::warnings(pair, (!self.by_matches).then_some(self.range));
         said.extend(warnings.iter().map(|warning| match self.rectification {
             Some(_) => remedy::of_rectified(warning, self.calibration.is_some(), words),
@@ -356,7 +355,7 @@ impl Input {
     }
 }
 
-/// The pair in two files, or in one that holds both views.
+/// Reads a pair from two files, or from one file with both views.
 pub(crate) fn views(
     reader: Reader,
     left: &Path,
@@ -375,8 +374,7 @@ fn ordered((pair, is_ordered): (Pair, bool), mask: Option<&Path>) -> Pair {
     if !is_ordered && mask.is_none() && is_swapped() { pair.exchanged() } else { pair }
 }
 
-/// Puts what follows the views in its place on a command line. A file `left` that holds both views has no `right` one, so that what follows
-/// stands there.
+/// Assigns the positional arguments after LEFT. If `left` holds both views there is no RIGHT, so the argument in its place is `next`.
 pub(crate) fn behind_views(
     left: &Path,
     right: &mut Option<PathBuf>,
@@ -385,13 +383,14 @@ pub(crate) fn behind_views(
     if next.is_none() && list::holds_both(left) {
         *next = right.take();
     } else if right.is_none() {
-        let reason = format!("it is missing, and {} holds one view; .mpo and .jps hold both", left.display());
+        let reason =
+            format!("missing; {} holds one view only (.mpo and .jps files hold both)", left.display());
         return Err(Failure::usage("RIGHT", reason));
     }
     Ok(())
 }
 
-/// The raw pair in two files, or in one that holds both views. These may differ in size.
+/// Reads a raw pair from two files, which may differ in size, or from one file with both views.
 pub(crate) fn raw_views(
     reader: Reader,
     left: &Path,
@@ -404,23 +403,23 @@ pub(crate) fn raw_views(
     }
 }
 
-/// The unit of depths, for people, by a calibration `file` or by flags.
+/// The unit of depths for messages, given by a calibration `file` or by flags.
 pub(crate) fn unit(unit: Unit, file: Option<&Path>) -> String {
     match (unit, file) {
-        (Unit::Unknown, Some(file)) => format!("that of the baseline in {}", file.display()),
-        (Unit::Unknown, None) => "that of --baseline".into(),
-        (unit, Some(file)) => format!("{}, by {}", unit.name(), file.display()),
+        (Unit::Unknown, Some(file)) => format!("same as the baseline in {}", file.display()),
+        (Unit::Unknown, None) => "same as --baseline".into(),
+        (unit, Some(file)) => format!("{}, from {}", unit.name(), file.display()),
         (unit, None) => unit.name().into(),
     }
 }
 
-/// The calibration beside an image, where there is one: it counts as one that is given.
+/// The calib.txt beside an image, if it exists. It is treated as if given by --calib.
 pub(crate) fn beside(image: &Path) -> Option<Vec<PathBuf>> {
     let path = image.with_file_name(CALIBRATION);
     path.exists().then(|| vec![path])
 }
 
-/// What the calibration in `files` says of images that are rectified and of this `size`.
+/// The calibration in `files` for rectified images of this `size`.
 pub(crate) fn of_rectified_images(
     files: &[PathBuf],
     crop: &CropArgs,
@@ -429,7 +428,7 @@ pub(crate) fn of_rectified_images(
     of_rectified(&Calib::Files(files, crop).read()?, files, size)
 }
 
-/// Says on standard error what is probably wrong with the calibration of a rectified pair of this `size`, and with its file.
+/// Prints warnings about the calibration of a rectified pair of this `size`, and about its file.
 pub(crate) fn doubt_of(known: (&Path, &Calibration), size: (usize, usize)) {
     doubts_of(known, size).for_each(|doubt| say(&doubt));
 }
@@ -443,23 +442,22 @@ fn doubts_of(
     doubts.map(move |doubt| format!("{}: {}", name.display(), remedy::doubt(&doubt, words)))
 }
 
-/// What the calibration `known`, of these `files`, says of images that are rectified and of this `size`.
+/// The part of the calibration `known` (from `files`) that applies to rectified images of this `size`.
 fn of_rectified(known: &StereoCalibration, files: &[PathBuf], size: (usize, usize)) -> Result<Calibration> {
     let named = |reason: &str| Error::read(shown(files), reason);
     let calibration =
         known.of_rectified_images(Some(size)).map_err(|e| failure::in_file(e, shown(files).as_ref(), ""))?;
     Ok(calibration.ok_or_else(|| {
-        named("is of images that are not rectified; add --rectify, or give the calibration of the rectified pair")
+        named("describes images that are not rectified; add --rectify, or give the calibration of the rectified pair")
     })?)
 }
 
-/// Says on standard error what is probably wrong.
+/// Prints warnings.
 pub(crate) fn warn(warnings: impl IntoIterator<Item = Warning>) {
     warnings.into_iter().for_each(|warning| say(&remedy::warning(&warning, &remedy::FLAGS)));
 }
 
-/// Says on standard error what is probably wrong with the calibration of `files`; without one, how far the matches that took its place
-/// can be trusted.
+/// Prints doubts about the calibration in `files`; without one, also how reliable the rectification from matches is.
 pub(crate) fn doubt(by: &Rectification, files: &[PathBuf]) {
     if let Some(trust) = by.trust() {
         console::say(&trusted(trust));
@@ -467,9 +465,9 @@ pub(crate) fn doubt(by: &Rectification, files: &[PathBuf]) {
     doubts(by, files).for_each(|doubt| say(&doubt));
 }
 
-/// How far a rectification by matches can be trusted, for people.
+/// How reliable a rectification from matches is, for messages.
 fn trusted(trust: &Trust) -> String {
-    format!("rectified by its own matches, without a scale: {trust}")
+    format!("rectified without a calibration, so there is no scale: {trust}")
 }
 
 fn doubts(by: &Rectification, files: &[PathBuf]) -> impl Iterator<Item = String> {
@@ -481,7 +479,7 @@ fn say(warning: &str) {
     console::say(&format!("warning: {warning}"));
 }
 
-/// Rectifies `pair` by the `calibration` of `files`. Errors name these.
+/// Rectifies `pair` by the `calibration` in `files`, which errors name.
 pub(crate) fn rectify(
     calibration: &StereoCalibration,
     files: &[PathBuf],
@@ -490,7 +488,7 @@ pub(crate) fn rectify(
 ) -> Result<(Rectification, Pair)> {
     let rectification = Rectification::for_pair(calibration, pair, options).map_err(|e| match e {
         Error::Mismatch(reason) => Error::Mismatch(format!(
-            "{}: {reason}: give images of that size, or say by --calib-crop which part of them these show",
+            "{}: {reason}: give images of that size, or say with --calib-crop which part of them these show",
             shown(files)
         )),
         e => failure::in_file(e, shown(files).as_ref(), ""),
@@ -499,7 +497,7 @@ pub(crate) fn rectify(
     Ok((rectification, pair))
 }
 
-/// Rectifies the `pair` of the files `names` by its own matches. Errors name these.
+/// Rectifies `pair` without a calibration, from its own matches. Errors name the files `names`.
 pub(crate) fn rectify_alone(
     names: [&Path; 2],
     pair: &Pair,
@@ -516,10 +514,10 @@ pub(crate) fn rectify_alone(
     Ok((by, pair))
 }
 
-/// The cameras that `word` takes, by the `calibration` file of the pair, whose left image is `left` and has `size`.
+/// The cameras for the output `word`, from the `calibration` of the pair, whose left image is `left` and has this size.
 ///
 /// # Errors
-/// Where there is no such file, or it is of another size or lacks what depth takes; `remedy` says how to give one.
+/// If there is no calibration, or it is for another size or lacks values that depth needs; `remedy` says how to give one.
 pub(crate) fn rig(
     word: &Also,
     calibration: Option<(&Path, &Calibration)>,
@@ -529,14 +527,14 @@ pub(crate) fn rig(
 ) -> Result<Rig> {
     let Some((path, calibration)) = calibration else {
         let reason =
-            format!("takes the cameras, and there is no calib.txt beside {}; {remedy}", left.display());
+            format!("needs camera values, but there is no calib.txt beside {}; {remedy}", left.display());
         return Err(Failure::usage(word.flag(), reason));
     };
     let size = (calibration.width.unwrap_or(width as u32), calibration.height.unwrap_or(height as u32));
     if size != (width as u32, height as u32) {
         return Err(Error::Mismatch(format!(
-            "{} is for images of {} x {} and {} is {width} x {height}: depth takes the calibration of this size, or --calib-crop, \
-             which says the part of them that these show",
+            "{} is for images of {} x {} but {} is {width} x {height}: give the calibration of this size, or say with --calib-crop \
+             which part of them these show",
             path.display(),
             size.0,
             size.1,
@@ -547,7 +545,7 @@ pub(crate) fn rig(
     let rig = Rig::new(calibration).map_err(|e| failure::in_file(e, path, ""))?;
     if word.takes_unit() && rig.unit().millimetres().is_none() {
         let reason = format!(
-            "{} does not say the unit of the baseline; add an entry `unit` to it: mm, cm or m",
+            "{} lacks the unit of the baseline; add an entry `unit` to it: mm, cm or m",
             path.display()
         );
         return Err(Failure::usage(word.flag(), reason));

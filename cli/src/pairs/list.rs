@@ -1,7 +1,7 @@
-//! Lists of pairs: CSV files in UTF-8 whose header names their columns.
+//! Lists of pairs: CSV files in UTF-8 whose header names the columns.
 //!
-//! The columns are name, left and right, and optionally `max_disparity`, `min_disparity`, mask and calibration. An empty field counts as
-//! missing. Empty lines and lines that begin with # are skipped.
+//! Columns are name, left and right, and optionally `max_disparity`, `min_disparity`, mask and calibration. An empty field counts as
+//! missing. Empty lines and lines starting with # are skipped.
 
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -21,9 +21,9 @@ pub(crate) const COLUMNS: [&str; 7] =
     ["name", "left", "right", "max_disparity", "min_disparity", "mask", "calibration"];
 const REQUIRED: usize = 3;
 
-/// The longest name of a pair, in bytes: file systems allow more, which leaves room for the endings of its files.
+/// The longest name of a pair in bytes, short enough to leave room for the endings of its files.
 const MAX_NAME: usize = 200;
-/// A list of a million pairs is smaller.
+/// Enough for a list of a million pairs.
 const MAX_BYTES: u64 = 1 << 28;
 
 /// One pair of a list.
@@ -31,27 +31,27 @@ const MAX_BYTES: u64 = 1 << 28;
 pub struct Row {
     /// The name of its outputs; see [`Names`].
     pub name: String,
-    /// Path of the left image. Paths are as the list has them.
+    /// Path of the left image, as written in the list.
     pub left: String,
-    /// Path of the right image; `None` where the left file holds both views.
+    /// Path of the right image; `None` if the left file holds both views.
     pub right: Option<String>,
     /// Path of the mask, if there is one.
     pub mask: Option<String>,
-    /// Paths of the files of the calibration; none where the list does not say it.
+    /// Paths of the calibration files; empty if the list has none.
     pub calibration: Vec<String>,
-    /// Largest disparity to search, where the list says it.
+    /// Largest disparity to search, if given.
     pub max_disparity: Option<Largest>,
-    /// Smallest disparity to search, in pixels, where the list says it; at most the largest.
+    /// Smallest disparity to search, in pixels, if given; at most the largest.
     pub min_disparity: Option<i32>,
 }
 
-/// Reads a list; it may have no rows.
+/// Reads a list, which may have no rows.
 ///
 /// # Errors
-/// [`Error::Read`] with the line, where there is one, for what cannot be read or makes no sense.
+/// [`Error::Read`], with the line number if the fault is in a line.
 pub fn read(path: &Path) -> Result<Vec<Row>> {
     let text = String::from_utf8(text::read(path, MAX_BYTES, "list of pairs")?)
-        .map_err(|_| Error::read(path, "is no text in UTF-8; give a CSV file"))?;
+        .map_err(|_| Error::read(path, "is not UTF-8 text; give a CSV file"))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let lines = text.lines().zip(1..).map(|(line, number)| (number, line));
     let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
@@ -68,37 +68,34 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// The fields of a line of CSV.
+/// The fields of a CSV line.
 fn fields(line: &str) -> StringRecord {
     let mut reader =
         ReaderBuilder::new().has_headers(false).flexible(true).trim(Trim::All).from_reader(line.as_bytes());
-    // A line of UTF-8 in memory always is a record.
+    // A line of UTF-8 in memory is always a record.
     reader.records().next().and_then(std::result::Result::ok).unwrap_or_default()
 }
 
-/// Which column each field of the rows belongs to.
+/// The column that each field of a row belongs to.
 fn columns(header: &StringRecord) -> std::result::Result<Vec<&'static str>, String> {
     let known = COLUMNS.join(", ");
     let mut columns = Vec::new();
     for field in header {
         let column = COLUMNS.into_iter().find(|column| *column == field);
-        let column = column.ok_or_else(|| {
-            format!("{} is no column; the header names the columns, of {known}", quoted(field))
-        })?;
+        let column =
+            column.ok_or_else(|| format!("unknown column {}; the header may name {known}", quoted(field)))?;
         if columns.contains(&column) {
-            return Err(format!("there are two columns {column}; remove one"));
+            return Err(format!("the column {column} appears twice; remove one"));
         }
         columns.push(column);
     }
     match COLUMNS[..REQUIRED].iter().find(|column| !columns.contains(column)) {
-        Some(missing) => {
-            Err(format!("there is no column {missing}; the header names the columns, of {known}"))
-        }
+        Some(missing) => Err(format!("the column {missing} is missing; the header may name {known}")),
         None => Ok(columns),
     }
 }
 
-/// Whether a file holds both views, by its name.
+/// Whether a file holds both views, according to its extension.
 pub(crate) fn holds_both(file: &Path) -> bool {
     let extension = file.extension().unwrap_or_default();
     ["mpo", "jps"].iter().any(|both| extension.eq_ignore_ascii_case(both))
@@ -108,7 +105,7 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
     if fields.len() != columns.len() {
         let (found, wanted) = (fields.len(), columns.len());
         return Err(format!(
-            "there are {found} fields and {wanted} columns; give one each, in double quotes where it has a comma"
+            "there are {found} fields but {wanted} columns; put fields with a comma in double quotes"
         ));
     }
     let field = |name: &str| {
@@ -140,36 +137,36 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
     Ok(row)
 }
 
-/// The names of pairs so far, each fit for files on every file system: without / \ : * ? " < > | and control characters, no . or -
-/// first, no . or space last, and no ending that `mrfgs batch` gives to further outputs of a pair (.confidence and the
-/// like). They differ by more than upper and lower case: on some file systems `A` and `a` are one file.
+/// The names of pairs so far, each valid as a file name on every file system: without / \ : * ? " < > | and control characters, no leading
+/// . or -, no trailing . or space, and no ending that `mrfgs batch` adds to further outputs (.confidence and so on). Names must differ by
+/// more than case, as some file systems ignore it.
 #[derive(Debug, Default)]
 pub struct Names(HashMap<String, usize>);
 
 impl Names {
-    /// Adds a name from line `line` (from 1; 0 where there are no lines).
+    /// Adds a name from line `line` (from 1; 0 if there are no lines).
     ///
     /// # Errors
-    /// What is wrong and the remedy, for a name that is taken or unfit for a file.
+    /// The problem and the remedy, for a name that is taken or unfit for a file.
     pub fn add(&mut self, name: &str, line: usize) -> std::result::Result<(), String> {
         let forbidden = |c: char| c.is_control() || r#"/\:*?"<>|"#.contains(c);
         let ends_badly = name.starts_with(['.', '-', ' ']) || name.ends_with(['.', ' ']);
         if name.len() > MAX_NAME || ends_badly || name.contains(forbidden) {
             return Err(format!(
-                r#"{} is no name for files; rename it: at most {MAX_NAME} bytes, none of / \ : * ? " < > |, no . or - first, no . or space last"#,
+                r#"{} cannot be a file name; rename it: at most {MAX_NAME} bytes, none of / \ : * ? " < > |, no leading . or -, no trailing . or space"#,
                 quoted(name)
             ));
         }
         let lower = name.to_lowercase();
         if let Some(ending) = also::endings().find(|ending| lower.ends_with(ending)) {
-            return Err(format!("`{name}` ends in {ending}, as outputs of other pairs do; rename it"));
+            return Err(format!("`{name}` ends in {ending}, which is reserved for outputs; rename it"));
         }
         if let Some(other) = self.0.insert(lower, line) {
             let mut reason = format!("the name {name} is taken");
             if other > 0 {
                 let _ = write!(reason, " by line {other}");
             }
-            return Err(reason + "; rename one of them, by more than upper and lower case");
+            return Err(reason + "; rename one of them (case does not count)");
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Where pairs come from.
+//! Sources of pairs.
 
 pub(crate) mod folder;
 pub(crate) mod input;

@@ -1,4 +1,4 @@
-//! Images of a folder or of a pattern, in the order of their numbers.
+//! Images of a folder or a pattern, in the order of their numbers.
 
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -7,22 +7,22 @@ use std::path::{Path, PathBuf};
 
 use mrfgs::{Error, Result};
 
-/// What an image in a folder may be called.
+/// Extensions of images in a folder.
 const EXTENSIONS: [&str; 11] =
     ["png", "jpg", "jpeg", "pgm", "ppm", "pnm", "tif", "tiff", "bmp", "pfm", "npy"];
 
-/// The images that `path`, a folder or a pattern, names; `None` where it names something else.
+/// The images of `path`, a folder or a pattern; `None` for anything else.
 ///
 /// # Errors
-/// Where there is no image, or two have one stem.
+/// If there is no image, or two have the same stem.
 pub(super) fn list(path: &Path) -> Result<Option<Vec<PathBuf>>> {
     let text = path.to_string_lossy();
     let (mut files, none) = if path.is_dir() {
-        (in_folder(path)?, "holds no images")
+        (in_folder(path)?, "contains no images")
     } else if text.contains(['*', '?', '[']) && !path.exists() {
-        (of_pattern(path, &text)?, "no image has such a name")
+        (of_pattern(path, &text)?, "no image matches")
     } else if text.contains('%') && !path.exists() {
-        (of_numbers(path, &text)?, "no image has such a name")
+        (of_numbers(path, &text)?, "no image matches")
     } else {
         return Ok(None);
     };
@@ -33,7 +33,10 @@ pub(super) fn list(path: &Path) -> Result<Option<Vec<PathBuf>>> {
     let mut stems = HashMap::new();
     for file in &files {
         if let Some(other) = stems.insert(stem(file).to_lowercase(), file) {
-            let reason = format!("has the stem of {}, and maps are named after it", other.display());
+            let reason = format!(
+                "has the same name as {} up to the extension, so their maps would collide; rename one",
+                other.display()
+            );
             return Err(Error::read(file, reason));
         }
     }
@@ -52,14 +55,14 @@ fn in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 fn of_pattern(path: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
-    // As shells have it, * leaves hidden files out.
+    // As in shells, * does not match hidden files.
     let options = glob::MatchOptions {
         require_literal_separator: true,
         require_literal_leading_dot: true,
         ..glob::MatchOptions::new()
     };
-    let found =
-        glob::glob_with(pattern, options).map_err(|e| Error::read(path, format!("is no pattern: {e}")))?;
+    let found = glob::glob_with(pattern, options)
+        .map_err(|e| Error::read(path, format!("is not a valid pattern: {e}")))?;
     let found = found.collect::<Result<Vec<_>, _>>();
     let found = found.map_err(|e| {
         let path = e.path().to_owned();
@@ -68,10 +71,11 @@ fn of_pattern(path: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
     Ok(found.into_iter().filter(|file| file.is_file()).collect())
 }
 
-/// The images that a pattern of C's printf names: frame_%04d.png, as ffmpeg and OpenCV take them.
+/// The images of a printf pattern such as frame_%04d.png, as in ffmpeg and OpenCV.
 fn of_numbers(path: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
     let no_pattern = || {
-        let reason = "there is no such file; numbers are written as %d or %04d, and whatever differs as * in 'left/*.png'";
+        let reason =
+            "there is no such file; in patterns write numbers as %d or %04d, or anything as * ('left/*.png')";
         Error::read(path, reason)
     };
     let (before, rest) = pattern.split_once('%').ok_or_else(no_pattern)?;
@@ -86,7 +90,7 @@ fn of_numbers(path: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
     }
     let [start, end] = [before, after].map(glob::Pattern::escape);
     let mut found = of_pattern(path, &format!("{start}*{end}"))?;
-    // More digits than it says have no zeros in front.
+    // As in printf, a number with more digits than the width has no leading zeros.
     let fits = |number: &str| {
         let few = digits == 1 || number.len() == digits;
         let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
@@ -104,12 +108,12 @@ pub(super) fn stem(file: &Path) -> String {
     file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The order of texts in which 9 comes before 10.
+/// Orders texts by the numbers in them, so that 9 comes before 10.
 fn by_number(a: &str, b: &str) -> Ordering {
     parts(a).cmp(parts(b)).then_with(|| a.cmp(b))
 }
 
-/// What is no number, and the number that follows: how many digits it has without leading zeros, and these.
+/// Splits a text into pairs of non-digits and a number: (non-digits, number of digits without leading zeros, these digits).
 fn parts(text: &str) -> impl Iterator<Item = (&str, usize, &str)> {
     let mut rest = text;
     std::iter::from_fn(move || {

@@ -26,18 +26,18 @@ pub(crate) use rectifier::{Rectifier, turned};
 use stream::Stream;
 pub(crate) use stream::{FrameRate, RawFrames, raw_frames};
 
-/// How both views lie in one frame.
+/// The arrangement of both views in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Layout {
-    /// The left view on the left
+    /// Left view on the left
     #[default]
     SideBySide,
-    /// The left view on top
+    /// Left view on top
     TopBottom,
 }
 
 impl Layout {
-    /// The left and the right view.
+    /// Splits a frame into left and right view.
     fn split(self, frame: &Raster) -> Result<[Raster<'static>; 2]> {
         let (width, height) = frame.size();
         let (whole, halves) = match self {
@@ -46,7 +46,7 @@ impl Layout {
         };
         if whole % 2 != 0 {
             let reason =
-                format!("{width} x {height} pixels are no two views: the {halves} are an odd number");
+                format!("frames of {width} x {height} cannot hold two views: the number of {halves} is odd");
             return Err(Error::Mismatch(reason));
         }
         let half = whole / 2;
@@ -59,14 +59,14 @@ impl Layout {
     }
 }
 
-/// Where frames come from.
+/// A source of frames.
 enum Source {
     Files { left: VecDeque<PathBuf>, reader: Reader },
     Stream(Stream),
 }
 
 impl Source {
-    /// What `path` holds: a folder, a pattern, or a stream; `raw` says what a stream without a header holds.
+    /// Opens `path`: a folder, a pattern or a stream; `raw` describes a stream without a header.
     fn open(path: &Path, raw: Option<RawFrames>, reader: Reader) -> Result<Self> {
         match files::list(path)? {
             Some(left) => Ok(Self::Files { left: left.into(), reader }),
@@ -81,7 +81,7 @@ impl Source {
         }
     }
 
-    /// The next frame and, where it has one, its name; `None` after the last one.
+    /// The next frame, with its name if it has one; `None` after the last one.
     fn next(&mut self) -> Option<Result<(Option<String>, Raster<'static>)>> {
         match self {
             Self::Files { left, reader } => {
@@ -93,19 +93,19 @@ impl Source {
     }
 }
 
-/// Both views at one time.
-pub(crate) struct Frame {
-    /// The stem of the file of the left view, the time of a recorded one in seconds, or the number of the frame, from 000000 on.
+/// A pair at one point in time.
+pub(crate) struct FramePair {
+    /// The stem of the left file, the time of a recorded image in seconds, or the frame number from 000000 on.
     pub(crate) name: String,
-    /// Time and camera of a recorded left view.
+    /// The ROS header of a recorded left view.
     pub(crate) header: Option<Header>,
     pub(crate) pair: Pair,
 }
 
 /// The sources of both views.
 #[allow(clippy::large_enum_variant, reason = "there is one of it")]
-enum Views {
-    /// One for each view; without the right one, frames hold both.
+enum FrameSource {
+    /// A source per view; without `right`, each frame of `left` holds both views.
     Sources {
         left: Source,
         right: Option<Source>,
@@ -116,12 +116,12 @@ enum Views {
 
 /// The frames of a sequence, in order.
 pub(crate) struct Frames {
-    views: Views,
-    /// How many came so far.
+    views: FrameSource,
+    /// The number of frames so far.
     count: usize,
-    /// Where the left view of every frame is ignored.
+    /// `true` where the left view of every frame is ignored.
     mask: Option<Plane<bool>>,
-    /// Whether they are images as the cameras took them, which may differ in size.
+    /// Whether frames are raw images, which may differ in size.
     raw: bool,
     /// (width, height) of the first pair.
     size: Option<(usize, usize)>,
@@ -129,21 +129,21 @@ pub(crate) struct Frames {
     names: [String; 2],
 }
 
-/// What is known of the left view.
+/// The name and the header of a left view.
 #[derive(Default)]
-struct About {
+struct FrameInfo {
     name: Option<String>,
     header: Option<Header>,
 }
 
-/// Both views of one time.
-type Rasters = (About, [Raster<'static>; 2]);
+/// Both views at one point in time.
+type Rasters = (FrameInfo, [Raster<'static>; 2]);
 
 impl Frames {
-    /// The frames of two sources, or of one with both views in each frame.
+    /// The frames of two sources, or of one source with both views in each frame.
     ///
     /// # Errors
-    /// Where there is none, or images of two cameras are no pairs; errors of streams.
+    /// If a source has no images, the images of two cameras cannot be paired, or a stream fails.
     pub(crate) fn open(
         left: &Path,
         right: Option<&Path>,
@@ -164,7 +164,7 @@ impl Frames {
             [*l, *r] = pairs.map(Into::into);
         }
         Ok(Self {
-            views: Views::Sources { left, right, layout },
+            views: FrameSource::Sources { left, right, layout },
             count: 0,
             mask: None,
             raw: false,
@@ -176,20 +176,20 @@ impl Frames {
     /// The frames of a recording.
     pub(crate) fn of_recording(recorded: Recorded) -> Self {
         let name = recorded.path().display().to_string();
-        let views = Views::Recorded(recorded);
+        let views = FrameSource::Recorded(recorded);
         Self { views, count: 0, mask: None, raw: false, size: None, names: [name.clone(), name] }
     }
 
-    /// The sources where frames come from files and streams, left and right.
+    /// The sources of frames from files and streams, left then right; none for a recording.
     fn sources(&self) -> impl Iterator<Item = &Source> {
         let (left, right) = match &self.views {
-            Views::Sources { left, right, .. } => (Some(left), right.as_ref()),
-            Views::Recorded(_) => (None, None),
+            FrameSource::Sources { left, right, .. } => (Some(left), right.as_ref()),
+            FrameSource::Recorded(_) => (None, None),
         };
         left.into_iter().chain(right)
     }
 
-    /// How many there are, where that is known.
+    /// The number of frames, if known.
     pub(crate) fn len(&self) -> Option<usize> {
         match self.sources().next()? {
             Source::Files { left, .. } => Some(left.len() + self.count),
@@ -197,7 +197,7 @@ impl Frames {
         }
     }
 
-    /// How many frames a second the left source has, where it says so.
+    /// The frame rate of the left source, if it is known.
     pub(crate) fn rate(&self) -> Option<FrameRate> {
         match self.sources().next()? {
             Source::Files { .. } => None,
@@ -205,17 +205,17 @@ impl Frames {
         }
     }
 
-    /// Whether they are images of two cameras.
+    /// Whether both sources are image files.
     pub(crate) fn are_images_of_two(&self) -> bool {
         self.sources().count() == 2 && !self.have_stream()
     }
 
-    /// Whether a stream is among the sources.
+    /// Whether a source is a stream.
     pub(crate) fn have_stream(&self) -> bool {
         self.sources().any(|source| matches!(source, Source::Stream(_)))
     }
 
-    /// The first image of the left camera, where frames are images.
+    /// The first left image, if frames are image files.
     pub(crate) fn first_image(&self) -> Option<&Path> {
         match self.sources().next()? {
             Source::Files { left, .. } => left.front().map(PathBuf::as_path),
@@ -223,7 +223,7 @@ impl Frames {
         }
     }
 
-    /// The films that ffmpeg decodes, each with what that complains of by its end.
+    /// The films that ffmpeg decodes, each with a handle to ffmpeg's warning.
     pub(crate) fn films(&self) -> impl Iterator<Item = (&Path, Complaint)> {
         self.sources().filter_map(|source| match source {
             Source::Files { .. } => None,
@@ -237,41 +237,41 @@ impl Frames {
         self
     }
 
-    /// Takes frames as two cameras took them, to be rectified.
+    /// Treats frames as raw images, to be rectified later.
     pub(crate) fn taken_raw(self) -> Self {
         Self { raw: true, ..self }
     }
 
-    /// The files that are read, none of which an output may overwrite.
+    /// The input files, which no output may overwrite.
     pub(crate) fn files(&self) -> Vec<&Path> {
         match &self.views {
-            Views::Sources { .. } => self.sources().flat_map(Source::files).collect(),
-            Views::Recorded(recorded) => recorded.files().collect(),
+            FrameSource::Sources { .. } => self.sources().flat_map(Source::files).collect(),
+            FrameSource::Recorded(recorded) => recorded.files().collect(),
         }
     }
 
     fn rasters(&mut self) -> Option<Result<Rasters>> {
-        let of = |name| About { name, header: None };
+        let of = |name| FrameInfo { name, header: None };
         let (left, right) = match &mut self.views {
-            Views::Recorded(recorded) => {
+            FrameSource::Recorded(recorded) => {
                 return Some(recorded.next()?.map(|(header, views)| {
                     let name = Some(header.stamp.to_string());
-                    (About { name, header: Some(header) }, views)
+                    (FrameInfo { name, header: Some(header) }, views)
                 }));
             }
-            Views::Sources { left, right: None, layout } => {
+            FrameSource::Sources { left, right: None, layout } => {
                 return Some(left.next()?.and_then(|(name, frame)| {
                     let split = layout.split(&frame);
                     let views = split.map_err(|e| named(e, name.as_ref().unwrap_or(&self.names[0])))?;
                     Ok((of(name), views))
                 }));
             }
-            Views::Sources { left, right: Some(right), .. } => (left, right),
+            FrameSource::Sources { left, right: Some(right), .. } => (left, right),
         };
         let (l, r) = threads::join(|| left.next(), || right.next());
         let ended = |which: usize| {
             let (one, other) = (&self.names[which], &self.names[1 - which]);
-            Error::Mismatch(format!("{one} ends here and {other} goes on"))
+            Error::Mismatch(format!("{one} ends here but {other} goes on"))
         };
         match (l, r) {
             (None, None) => None,
@@ -282,7 +282,7 @@ impl Frames {
         }
     }
 
-    fn frame(&mut self, (About { name, header }, [left, right]): Rasters) -> Result<Frame> {
+    fn frame(&mut self, (FrameInfo { name, header }, [left, right]): Rasters) -> Result<FramePair> {
         let name = name.unwrap_or_else(|| format!("{:06}", self.count));
         let left = match &self.mask {
             Some(mask) => left.masked_by(mask.clone()).map_err(|e| named(e, &name))?,
@@ -292,15 +292,17 @@ impl Frames {
         let pair = pair.map_err(|e| named(e, &name))?;
         let (size, (width, height)) = (*self.size.get_or_insert(pair.size()), pair.size());
         if size != (width, height) {
-            let reason = format!("is {width} x {height} and those before it are {} x {}", size.0, size.1);
-            return Err(Error::Mismatch(format!("frame {name} {reason}: all frames have one size")));
+            let reason = format!("is {width} x {height} but earlier ones are {} x {}", size.0, size.1);
+            return Err(Error::Mismatch(format!(
+                "frame {name} {reason}: all frames must have the same size"
+            )));
         }
         self.count += 1;
-        Ok(Frame { name, header, pair })
+        Ok(FramePair { name, header, pair })
     }
 }
 
-/// An error of a frame that names it.
+/// Adds the name of the frame to an error.
 fn named(error: Error, name: &str) -> Error {
     match error {
         Error::Mismatch(reason) => Error::Mismatch(format!("frame {name}: {reason}")),
@@ -309,7 +311,7 @@ fn named(error: Error, name: &str) -> Error {
 }
 
 impl Iterator for Frames {
-    type Item = Result<Frame>;
+    type Item = Result<FramePair>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let rasters = self.rasters()?;

@@ -1,4 +1,4 @@
-//! Images of two cameras that are pairs: by the numbers in their names.
+//! Pairs images of two cameras by the numbers in their names.
 
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
@@ -8,22 +8,22 @@ use mrfgs::{Error, Result};
 
 use super::files::stem;
 
-/// Which images of two cameras are a pair.
+/// How images of two cameras are paired.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Pairing {
-    /// Those with the same number in their names; each has a partner
+    /// By the number in their names; every image needs a partner
     #[default]
     Number,
-    /// Those with the same number; what has no partner is left out
+    /// By the number in their names; images without a partner are skipped
     Common,
-    /// The first with the first, whatever their numbers
+    /// By order: the first with the first, whatever their numbers
     Order,
 }
 
-/// The images of two cameras, called by `names`, that are pairs, in the order of the left ones.
+/// Pairs the images of two cameras, called `names` in errors, in the order of the left ones.
 ///
 /// # Errors
-/// Where an image has no partner and may not be left out, where all are left out, and where they are not as many of both.
+/// If an image without a partner may not be skipped, if all would be skipped, or if the counts differ in [`Pairing::Order`].
 pub(super) fn pair(
     cameras: [Vec<PathBuf>; 2],
     pairing: Pairing,
@@ -34,7 +34,7 @@ pub(super) fn pair(
         Some(numbers) => partners(cameras, &numbers, pairing, names),
         None if left == right => Ok(cameras),
         None => Err(Error::Mismatch(format!(
-            "{} holds {left} images and {} {right}: give as many of the left as of the right camera",
+            "{} has {left} images but {} has {right}: give the same number for both cameras",
             names[0], names[1]
         ))),
     }
@@ -57,12 +57,12 @@ fn partners(
     {
         let more = match alone.count() {
             0 => String::new(),
-            1 => " (nor has one other)".into(),
-            more => format!(" (nor have {more} others)"),
+            1 => " (nor does one other)".into(),
+            more => format!(" (nor do {more} others)"),
         };
-        let common = if any_pair { "leave out such images by --pairing common, or " } else { "" };
+        let common = if any_pair { "skip such images with --pairing common, or " } else { "" };
         return Err(Error::Mismatch(format!(
-            "{} has no partner of its number in {}{more}: {common}take the first with the first by --pairing order",
+            "{} does not have a partner with its number in {}{more}: {common}pair images in order with --pairing order",
             cameras[camera][i].display(),
             names[1 - camera]
         )));
@@ -73,15 +73,15 @@ fn partners(
     Ok(pairs.unzip::<_, _, Vec<_>, Vec<_>>().into())
 }
 
-/// Numbers in a name, without leading zeros.
+/// The numbers in a name, without leading zeros.
 type Numbers = Vec<String>;
 
-/// The numbers by which the names of each camera's images differ. `None` where numbers alone do not tell them apart.
+/// For each camera, the numbers in which its names differ; `None` if numbers alone do not identify its images.
 fn numbers(cameras: &[Vec<PathBuf>; 2]) -> Option<[Vec<Numbers>; 2]> {
     let mut all =
         cameras.each_ref().map(|files| files.iter().map(|file| in_name(&stem(file))).collect::<Vec<_>>());
     let mut differing = all.each_ref().map(|names| differing(names));
-    // What differs for one camera counts for both: the other one may have a single image.
+    // A number that varies for one camera counts for both, since the other may have a single image.
     if let [Some(left), Some(right)] = &mut differing
         && left.len() == right.len()
     {
@@ -108,7 +108,7 @@ fn in_name(name: &str) -> Numbers {
     digits.map(|digits| digits.trim_start_matches('0').to_owned()).collect()
 }
 
-/// Which numbers of the names differ; `None` where not all have as many.
+/// Which numbers of the names differ; `None` if the names have different counts of numbers.
 fn differing(names: &[Numbers]) -> Option<Vec<bool>> {
     let first = names.first()?;
     let as_many = names.iter().all(|numbers| numbers.len() == first.len());
@@ -119,7 +119,7 @@ fn differing(names: &[Numbers]) -> Option<Vec<bool>> {
 mod tests {
     use super::*;
 
-    /// What is paired of names without their extensions: pairs, or the error.
+    /// The pairs, or the error, for names without extensions.
     fn paired(left: &str, right: &str, pairing: Pairing) -> Result<String, String> {
         let files = |names: &str| names.split(' ').map(|name| format!("{name}.png").into()).collect();
         let names = ["l".into(), "r".into()];
@@ -132,7 +132,7 @@ mod tests {
     fn partners_have_the_same_number() {
         for (left, right, pairs) in [
             ("0 1 3", "0 1 3", "0=0 1=1 3=3"),
-            // What differs between the cameras alone does not count, nor do zeros in front.
+            // Differences between the cameras and leading zeros do not count.
             ("cam0_08 cam0_9", "cam1_8 cam1_09", "cam0_08=cam1_8 cam0_9=cam1_09"),
             ("cam_8_L cam_9_L", "2_cam_1_8_R 2_cam_1_9_R", "cam_8_L=2_cam_1_8_R cam_9_L=2_cam_1_9_R"),
             (
@@ -141,9 +141,9 @@ mod tests {
                 "000001_10=000001_10 000001_11=000001_11 000002_10=000002_10",
             ),
             ("0001", "7", "0001=7"),
-            // Whatever order the names have.
+            // Names sort in different orders.
             ("1_a 2_b", "b_1 a_2", "1_a=b_1 2_b=a_2"),
-            // Numbers do not tell these apart.
+            // Numbers do not identify these.
             ("a b", "c d", "a=c b=d"),
             ("1a 1b", "3 4", "1a=3 1b=4"),
         ] {
@@ -155,19 +155,22 @@ mod tests {
     fn what_has_no_partner_is_named_or_left_out() {
         let (left, right) = ("0 1 3 5 7", "0 1 2 3 4");
         let said = paired(left, right, Pairing::Number).unwrap_err();
-        assert!(said.starts_with("5.png has no partner of its number in r (nor have 3 others)"), "{said}");
+        assert!(
+            said.starts_with("5.png does not have a partner with its number in r (nor do 3 others)"),
+            "{said}"
+        );
         assert!(said.contains("--pairing common") && said.contains("--pairing order"), "{said}");
         assert_eq!(paired(left, right, Pairing::Common).unwrap(), "0=0 1=1 3=3");
         assert_eq!(paired(left, right, Pairing::Order).unwrap(), "0=0 1=1 3=2 5=3 7=4");
         let said = paired("1 2", "1 2 x3", Pairing::Number).unwrap_err();
-        assert!(said.starts_with("x3.png has no partner of its number in l:"), "{said}");
-        // A camera with a single image is no exception.
+        assert!(said.starts_with("x3.png does not have a partner with its number in l:"), "{said}");
+        // A camera with a single image follows the same rule.
         assert_eq!(paired("4 5 6", "5", Pairing::Common).unwrap(), "5=5");
-        // Clocks of their own: nothing is common.
+        // The cameras have separate clocks, so no number is common.
         for pairing in [Pairing::Number, Pairing::Common] {
             let said = paired("1403 1453", "1404 1454", pairing).unwrap_err();
             assert!(said.contains("--pairing order") && !said.contains("common"), "{said}");
         }
-        assert!(paired("1 2", "1", Pairing::Order).unwrap_err().contains("l holds 2 images and r 1"));
+        assert!(paired("1 2", "1", Pairing::Order).unwrap_err().contains("l has 2 images but r has 1"));
     }
 }

@@ -1,4 +1,4 @@
-//! Pairs out of a recording of ROS.
+//! Pairs from a ROS recording.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,44 +19,44 @@ use crate::text::plural;
 pub(crate) struct Recorded {
     images: Images,
     files: Vec<PathBuf>,
-    /// The calibration of both cameras with the names of its topics, where it is there.
+    /// The calibration of both cameras with the names of their topics, if present.
     cameras: Option<[(String, CameraInfo); 2]>,
     messages: Box<dyn Iterator<Item = Result<Message>> + Send>,
     pairing: Pairing<Message>,
-    /// Why the messages ended.
+    /// The error that ended the messages.
     error: Option<Error>,
     ended: bool,
-    /// How many pairs came so far, and the time of the first image of each camera.
+    /// The number of pairs so far.
     count: usize,
     first: [Option<Stamp>; 2],
-    /// Images of each camera with a time, and with 0 in its place.
+    /// For each camera, the number of images with a time and with time 0.
     timed: [[usize; 2]; 2],
     remarks: Remarks,
 }
 
-/// Where messages are from, and how they become images.
+/// How messages become images.
 struct Images {
     path: PathBuf,
     topics: [Topic; 2],
     reader: Reader,
 }
 
-/// What there is to say of a recording, while and after the pairs are read.
+/// Remarks about a recording, collected while pairs are read.
 #[derive(Clone, Default)]
 pub(crate) struct Remarks(Arc<Mutex<Noted>>);
 
 #[derive(Clone, Default)]
 struct Noted {
-    /// What gave no pair.
+    /// Images that gave no pair.
     tally: Tally,
-    /// Where and when a calibration became another one.
+    /// The topic and the time at which a calibration changed.
     changed: Option<(String, Stamp)>,
-    /// How many messages a bag should hold, and how many fewer it does.
+    /// The number of messages in the metadata, and the number found.
     missing: Option<(u64, u64)>,
 }
 
-/// Both views of one time, and the header of the left one.
-pub(super) type Views = (Header, [Raster<'static>; 2]);
+/// Both views at one point in time, and the header of the left one.
+pub(super) type RecordedViews = (Header, [Raster<'static>; 2]);
 
 impl Recorded {
     /// Whether `path` is a recording, by its name or its first bytes.
@@ -67,7 +67,7 @@ impl Recorded {
     /// Opens the recording `path`.
     ///
     /// # Errors
-    /// Where it cannot be read, or has no two topics of images that are a pair.
+    /// If it cannot be read, or does not have two image topics that form a pair.
     pub(crate) fn open(path: &Path, args: &RecordingArgs, reader: Reader) -> Result<Self> {
         let recording = Recording::open(path)?;
         let all = recording.topics();
@@ -106,37 +106,38 @@ impl Recorded {
         self.files.iter().map(PathBuf::as_path)
     }
 
-    /// What there is to say so far.
+    /// A handle to the remarks.
     pub(crate) fn remarks(&self) -> Remarks {
         self.remarks.clone()
     }
 
-    /// Whether the images are rectified, by the names of their topics.
+    /// Whether the images are rectified, according to the names of their topics.
     pub(crate) fn is_rectified(&self) -> bool {
         self.images.topics.iter().all(Topic::is_rectified)
     }
 
-    /// Whether the topics say that the images are not rectified.
+    /// Whether a topic name marks the images as raw.
     pub(crate) fn is_raw(&self) -> bool {
         self.images.topics.iter().any(Topic::is_raw)
     }
 
-    /// The topic of the left images, and where its calibration would be.
+    /// The topic of the left images, and the topic where its calibration would be.
     pub(crate) fn left_topic(&self) -> (&str, String) {
         let beside = self.images.topics[0].camera_infos().pop().unwrap_or_default();
         (&self.images.topics[0].name, beside)
     }
 
-    /// The calibration that the recording has of both cameras: a text for each, with its name.
+    /// The recorded calibration of both cameras: a text for each, with its name.
     ///
     /// # Errors
-    /// Where the cameras are exchanged.
+    /// If left and right are swapped.
     pub(crate) fn calibration(&self) -> Result<Option<Vec<(PathBuf, String)>>> {
         let Some(cameras) = &self.cameras else { return Ok(None) };
         if ros::are_exchanged(cameras.each_ref().map(|(_, camera)| camera)) {
             let [left, right] = self.images.topics.each_ref().map(|topic| topic.name.as_str());
-            let reason =
-                format!("by its calibration {left} is the right camera; give --topics {right},{left}");
+            let reason = format!(
+                "according to its calibration {left} is the right camera; give --topics {right},{left}"
+            );
             return Err(Error::read(&self.images.path, reason));
         }
         let texts = cameras.iter().map(|(topic, camera)| {
@@ -147,7 +148,7 @@ impl Recorded {
     }
 
     /// The next pair; `None` after the last one.
-    pub(super) fn next(&mut self) -> Option<Result<Views>> {
+    pub(super) fn next(&mut self) -> Option<Result<RecordedViews>> {
         loop {
             if let Some(error) = self.without_times() {
                 return Some(Err(error));
@@ -186,7 +187,7 @@ impl Recorded {
         Ok(())
     }
 
-    /// Refuses images without times, all at once: nothing of them is a pair. A simulation begins at 0, which is a time then.
+    /// Refuses a recording whose images have no time. A single 0 is a valid time, as simulations start there.
     fn without_times(&mut self) -> Option<Error> {
         let are_untimed =
             |[timed, untimed]: [usize; 2]| untimed > 1 || self.ended && timed == 0 && untimed == 1;
@@ -194,14 +195,14 @@ impl Recorded {
         (self.ended, self.error, self.pairing, self.timed) = (true, None, Pairing::new(0), [[0; 2]; 2]);
         self.count = self.count.max(1);
         let reason = format!(
-            "the images on {} have no time in their headers (it is 0), and images are paired by these; let the driver of the camera set it, \
+            "images are paired by the time in their headers, but on {} that is 0; configure the camera driver to set it, \
              and record again",
             self.images.topics[side].name
         );
         Some(Error::read(&self.images.path, reason))
     }
 
-    /// Notes where a camera says something else than before. (What makes no sense does not count: the first one did.)
+    /// Notes a change of a camera's calibration. Malformed messages are ignored, as the first one was valid.
     fn check_camera(&self, side: usize, message: &Message) {
         let Some((topic, first)) = self.cameras.as_ref().map(|cameras| &cameras[side]) else { return };
         let Ok(now) = CameraInfo::decode(&message.data, message.encoding) else { return };
@@ -211,28 +212,28 @@ impl Recorded {
         }
     }
 
-    /// Why there is no pair at all.
+    /// The error if no pair was found.
     fn without_pairs(&self) -> Error {
         let [l, r] = self.images.topics.each_ref().map(|topic| topic.name.as_str());
         let reason = match self.first {
             [Some(left), Some(right)] => format!(
-                "no image of {l} has the time of one of {r}: the first ones are of {left} and {right}; give --tolerance SECONDS if the \
+                "no image of {l} has the same time as one of {r}: the first ones are at {left} and {right}; give --tolerance SECONDS if the \
                  cameras are not triggered together"
             ),
-            [None, _] => format!("has no image on {l}"),
-            [_, None] => format!("has no image on {r}"),
+            [None, _] => format!("contains no image on {l}"),
+            [_, None] => format!("contains no image on {r}"),
         };
         Error::read(&self.images.path, reason)
     }
 }
 
 impl Images {
-    /// An error of a message.
+    /// Adds the name of the message to an error.
     fn at(&self, message: &Message, reason: impl Into<mrfgs::error::Reason>) -> Error {
         Error::read(self.name_of(message), reason.into())
     }
 
-    /// What errors call a message: file, topic and time.
+    /// The name of a message in errors: file, topic and time.
     fn name_of(&self, message: &Message) -> PathBuf {
         let time = header(message).map(|header| format!(" at {}", header.stamp)).unwrap_or_default();
         format!("{}:{}{time}", self.path.display(), self.topics[message.topic].name).into()
@@ -249,30 +250,29 @@ impl Remarks {
         change(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// In words, where there is something to say.
+    /// The remarks as text; `None` without any.
     pub(crate) fn said(&self) -> Option<String> {
         let Noted { tally, changed, missing } = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let Tally { alone: [left, right], repeated, late } = tally;
         let mut said = Vec::new();
         if let Some((claimed, found)) = missing {
-            said.push(format!("the recording holds {found} messages, and {claimed} by its metadata.yaml"));
+            said.push(format!(
+                "the recording contains {found} messages, but its metadata.yaml says {claimed}"
+            ));
         }
         if left + right > 0 {
             said.push(format!("{left} left and {right} right image{} had no partner", plural(right)));
         }
         if repeated > 0 {
-            said.push(format!("{repeated} image{} had the time of another one", plural(repeated)));
+            said.push(format!("{repeated} image{} had the same time as another one", plural(repeated)));
         }
         if late > 0 {
-            said.push(format!(
-                "{late} image{} came too late in the recording to be put in order",
-                plural(late)
-            ));
+            said.push(format!("{late} image{} came too late in the recording to be paired", plural(late)));
         }
         if let Some((topic, stamp)) = changed {
             said.push(format!(
-                "the calibration on {topic} changes at {stamp}, and all frames were matched by the first one; match what comes then as a \
-                 recording of its own"
+                "the calibration on {topic} changes at {stamp}, but all frames were matched with the first one; match the rest as a \
+                 separate recording"
             ));
         }
         (!said.is_empty()).then(|| said.join(", "))
@@ -283,12 +283,12 @@ fn header(message: &Message) -> mrfgs_ros::messages::Result<Header> {
     Header::of(&message.data, message.encoding)
 }
 
-/// The first calibration of each camera; `None` where one is missing, or says that there is none.
+/// The first calibration of each camera; `None` if one is missing or empty.
 fn cameras(recording: &Recording, chosen: &[Topic; 2]) -> Result<Option<[(String, CameraInfo); 2]>> {
     let infos = chosen.each_ref().map(|topic| topics::camera_info(recording.topics(), topic));
     let [Some(left), Some(right)] = infos else { return Ok(None) };
     let mut found: [Option<CameraInfo>; 2] = [None, None];
-    // Damage in the recording is told with the image that it hits.
+    // Ignore damage here; it is reported with the image that it affects.
     for message in recording.messages(&[&left.name, &right.name]).map_while(Result::ok) {
         let name = format!("{}:{}", recording.path().display(), [left, right][message.topic].name);
         let camera = CameraInfo::decode(&message.data, message.encoding);

@@ -1,4 +1,4 @@
-//! A rig whose right camera turns while it is filmed.
+//! Rectification of frames, with tracking of a right camera that turns while filming.
 
 use mrfgs::drift::{Drift, Turn};
 use mrfgs::image::Pair;
@@ -7,11 +7,11 @@ use mrfgs::rectification::Rectification;
 
 use crate::failure::Result;
 
-/// Rectifies the frames, and watches whether that is still right.
+/// Rectifies the frames and tracks whether the calibration still holds.
 pub(crate) struct Rectifier {
-    /// What rectifies the next frame; `None` where frames are rectified already, and stand as they were calibrated.
+    /// The rectification of the next frame; `None` if frames arrive rectified and need no correction.
     by: Option<Rectification>,
-    /// Where the cameras are known.
+    /// `None` if the cameras are unknown.
     watched: Option<Watched>,
 }
 
@@ -24,7 +24,7 @@ struct Watched {
 }
 
 impl Rectifier {
-    /// With frames that `by` rectifies, or that are rectified already by a calibration that would be `known` as such.
+    /// For frames that `by` rectifies, or that are already rectified; then `known` is their calibration as a rectification.
     pub(crate) fn new(
         by: Option<Rectification>,
         known: Option<Rectification>,
@@ -38,7 +38,7 @@ impl Rectifier {
         Self { by, watched }
     }
 
-    /// The next frame, rectified, and how the right camera has turned by then.
+    /// The next frame, rectified, and the turn of the right camera so far.
     pub(crate) fn rectified(&mut self, pair: Pair) -> Result<(Pair, Option<Turn>)> {
         let pair = match &self.by {
             Some(by) => by.apply(&pair)?,
@@ -48,7 +48,7 @@ impl Rectifier {
         Ok((pair, turn))
     }
 
-    /// How the right camera has turned by this frame, which is rectified.
+    /// The turn of the right camera, updated with this rectified frame.
     pub(crate) fn followed(&mut self, pair: &Pair) -> Result<Option<Turn>> {
         let Some(Watched { calibrated, drift, range, recalibrate }) = &mut self.watched else {
             return Ok(None);
@@ -61,7 +61,7 @@ impl Rectifier {
     }
 }
 
-/// How the right camera has turned in a sequence, for people; `None` where that does not matter.
+/// Describes the turn of the right camera for messages; `None` if it is negligible.
 pub(crate) fn turned(turn: &Turn, recalibrated: bool) -> Option<String> {
     const LEAST: f64 = 0.005;
     if !turn.counts() {
@@ -74,9 +74,13 @@ pub(crate) fn turned(turn: &Turn, recalibrated: bool) -> Option<String> {
             format!("{:.2} {}", degrees.abs(), if degrees > 0.0 { way } else { back })
         })
         .collect();
-    let end = if recalibrated { "; that is corrected" } else { "; give --recalibrate, or calibrate again" };
+    let end = if recalibrated {
+        "; frames are corrected for this"
+    } else {
+        "; add --recalibrate, or calibrate again"
+    };
     Some(format!(
-        "the right camera has turned since the calibration, by these degrees: {}. That moves rows apart by up to {:.1} px{end}",
+        "the right camera has turned since the calibration, in degrees: {}. This shifts rows by up to {:.1} px{end}",
         parts.join(", "),
         turn.rows
     ))

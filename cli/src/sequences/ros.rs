@@ -1,4 +1,4 @@
-//! Images and cameras of ROS, from recordings and live.
+//! ROS images and cameras, from recordings and live.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use mrfgs::{Error, Result};
 use mrfgs_ros::messages::{CameraInfo, CompressedImage, Encoding, Image, Type};
 use mrfgs_ros::pixels;
 
-/// The image in the bytes of a message of the type `kind`, which errors call `name`.
+/// Decodes the image in a message of the type `kind`, which errors call `name`.
 ///
 /// # Errors
-/// Where they hold none.
+/// If the bytes are not a valid image.
 pub(crate) fn view(
     kind: &str,
     bytes: &[u8],
@@ -32,19 +32,19 @@ pub(crate) fn view(
     }
 }
 
-/// Whether what is called left is the right camera: the baseline stands in the projection of the right one.
+/// Whether left and right are swapped: the baseline is in the projection of the right camera.
 pub(crate) fn are_exchanged(cameras: [&CameraInfo; 2]) -> bool {
     let [left, right] = cameras.map(|camera| camera.p[3]);
     left != 0.0 && right == 0.0
 }
 
-/// What a camera is in the words of a file, of images that are rectified or not.
+/// A camera as the text of a calibration file, for raw or rectified images.
 pub(crate) fn text(camera: &CameraInfo, is_rectified: bool) -> String {
     if is_rectified { camera.of_rectified().text() } else { camera.text() }
 }
 
-/// Whether a message says anything of the camera of images that are rectified or not.
+/// Whether a message contains the calibration of raw or rectified images.
 pub(crate) fn is_known(camera: &CameraInfo, is_rectified: bool) -> bool {
-    // Of what is rectified already the projection counts alone.
+    // Rectified images only need the projection.
     if is_rectified { camera.p[0] != 0.0 } else { camera.is_calibrated() }
 }

@@ -1,4 +1,4 @@
-//! Frames one after the other in a file or a pipe: YUV4MPEG2, which ffmpeg calls yuv4mpegpipe, or pixels alone.
+//! Streams of frames in a file or a pipe: YUV4MPEG2 (ffmpeg's yuv4mpegpipe) or raw pixels.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -13,17 +13,17 @@ use mrfgs::{Error, Result};
 
 use crate::ffmpeg::{self, Complaint, Decoder};
 
-/// Frames a second, as a fraction.
+/// Frames per second, as a fraction.
 pub(crate) type FrameRate = (usize, usize);
 
-/// What a stream without a header holds.
+/// The frames of a stream without a header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct RawFrames {
     size: (usize, usize),
     format: PixelFormat,
 }
 
-/// The pixels of raw frames, by ffmpeg's names.
+/// Pixel formats of raw frames, by ffmpeg's names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum PixelFormat {
     Gray,
@@ -32,10 +32,10 @@ enum PixelFormat {
     Bgr24,
 }
 
-/// `WIDTHxHEIGHT,FORMAT`.
+/// Parses `WIDTHxHEIGHT,FORMAT`.
 ///
 /// # Errors
-/// What to give instead.
+/// A message with the accepted form.
 pub(crate) fn raw_frames(text: &str) -> Result<RawFrames, String> {
     let said = "give WIDTHxHEIGHT,FORMAT, such as 1280x480,gray; formats are gray, gray16le, rgb24 and bgr24";
     let parsed = || {
@@ -58,14 +58,14 @@ impl PixelFormat {
     }
 }
 
-/// Most bytes of a header; the decoder takes no more either.
+/// Maximum bytes of a header, the same limit as the decoder's.
 const MAX_HEADER: u64 = 1024;
-/// How many bytes tell whether a stream is something else than pixels alone.
+/// The number of leading bytes that tell raw pixels from known formats.
 const START: u64 = 9;
-/// Bytes that a pixel takes at most while its frame is read: three samples of 16 bits, and what becomes of them.
+/// Peak memory per pixel in bytes while a frame is read: three 16-bit samples and their conversion.
 const BYTES: u64 = 12;
 
-/// Bytes that are counted as they are read.
+/// A reader that counts its bytes.
 struct Counted {
     bytes: Box<dyn BufRead + Send>,
     count: Arc<AtomicU64>,
@@ -83,32 +83,32 @@ impl Read for Counted {
 pub(super) struct Stream {
     name: PathBuf,
     frames: Format,
-    /// How many came so far.
+    /// The number of frames so far.
     count: usize,
-    /// Bytes that have been read, and those up to the last whole frame.
+    /// Bytes read so far, and bytes up to the end of the last complete frame.
     read: Arc<AtomicU64>,
     whole: u64,
     ended: bool,
-    /// The complaints of ffmpeg, where it decodes the film.
+    /// ffmpeg's warning, if it decodes the film.
     decoded: Option<Complaint>,
 }
 
 enum Format {
-    Yuv(y4m::Decoder<Counted>, Range),
+    Yuv(y4m::Decoder<Counted>, LumaRange),
     Raw(Counted, RawFrames),
 }
 
-/// What the levels of black and white are.
+/// The levels of black and white.
 #[derive(Clone, Copy)]
-enum Range {
-    /// 16 and 235 of 8 bits.
+enum LumaRange {
+    /// 16 and 235, in 8 bits.
     Limited,
-    /// 0 and 255.
+    /// 0 and 255, in 8 bits.
     Full,
 }
 
 impl Stream {
-    /// The stream in the file `path`, or `-` for standard input.
+    /// Opens the stream in the file `path`, or `-` for standard input.
     pub(super) fn open(path: &Path, raw: Option<RawFrames>, max_pixels: u64) -> Result<Self> {
         let stdin = path == Path::new("-");
         let name = if stdin { PathBuf::from("standard input") } else { path.to_owned() };
@@ -127,7 +127,7 @@ impl Stream {
             check_start(&start).map_err(error)?;
             bytes = Box::new(io::Cursor::new(start).chain(bytes));
         } else {
-            // A pipe may hand it on in pieces.
+            // Read up to the first newline, as a pipe may deliver the header in pieces.
             let mut header = Vec::new();
             let read = bytes.by_ref().take(MAX_HEADER).read_until(b'\n', &mut header);
             read.map_err(|e| Error::read(&name, e))?;
@@ -150,7 +150,7 @@ impl Stream {
             let decoder = y4m::Decoder::new_with_limits(counted, y4m::Limits { bytes: usize::MAX });
             let decoder = decoder.map_err(|e| Error::read(&name, said(&e)))?;
             let full = decoder.get_raw_params().split(|b| *b == b' ').any(|word| word == b"XCOLORRANGE=FULL");
-            Format::Yuv(decoder, if full { Range::Full } else { Range::Limited })
+            Format::Yuv(decoder, if full { LumaRange::Full } else { LumaRange::Limited })
         };
         let whole = read.load(Ordering::Relaxed);
         Ok(Self { name, frames, count: 0, read, whole, ended: false, decoded })
@@ -166,17 +166,17 @@ impl Stream {
         }
     }
 
-    /// The file that it reads.
+    /// The file of the stream, if it is one.
     pub(super) fn file(&self) -> Option<&Path> {
         self.name.is_file().then_some(&self.name)
     }
 
-    /// Its file, where ffmpeg decodes it, and what that complains of by the end.
+    /// The film and ffmpeg's warning, if ffmpeg decodes it.
     pub(super) fn film(&self) -> Option<(&Path, Complaint)> {
         Some((&self.name, self.decoded.clone()?))
     }
 
-    /// The next frame; `None` after the last one, and after an error.
+    /// The next frame; `None` after the last one or an error.
     pub(super) fn next(&mut self) -> Option<Result<Raster<'static>>> {
         if self.ended {
             return None;
@@ -195,7 +195,7 @@ impl Stream {
                 Some(Ok(frame))
             }
             Ok(None) if read > self.whole => error("is cut off"),
-            Ok(None) if count == 0 => Some(Err(Error::read(&self.name, "holds no frame"))),
+            Ok(None) if count == 0 => Some(Err(Error::read(&self.name, "contains no frame"))),
             Ok(None) => None,
             Err(reason) => error(&reason),
         }
@@ -204,32 +204,30 @@ impl Stream {
 
 fn check_size((width, height): (usize, usize), max_pixels: u64) -> Result<(), String> {
     let pixels = (width as u64).checked_mul(height as u64).filter(|pixels| *pixels <= max_pixels);
-    let many = format!("frames of {width} x {height} pixels are more than the limit of {max_pixels}");
+    let many = format!("frames of {width} x {height} exceed the limit of {max_pixels} pixels");
     let bytes = pixels.ok_or(many)?.saturating_mul(BYTES);
     let room = Vec::<u8>::new().try_reserve_exact(usize::try_from(bytes).unwrap_or(usize::MAX));
     room.map_err(|_| format!("there is not enough memory for frames of {width} x {height} pixels"))
 }
 
-/// Refuses what is not pixels alone, by its first [`START`] bytes.
+/// Refuses known file formats in place of raw pixels, by their first [`START`] bytes.
 fn check_start(start: &[u8]) -> Result<(), String> {
     if start.starts_with(b"YUV4MPEG2") {
-        return Err("is YUV4MPEG2, which says itself what its frames hold: leave out --raw-frames".into());
+        return Err("is YUV4MPEG2, which describes its own frames: remove --raw-frames".into());
     }
     if ffmpeg::reads(start) || start.starts_with(b"\x89PNG") {
-        return Err("is a film or an image and not pixels alone: leave out --raw-frames".into());
+        return Err("is a film or an image, not raw pixels: remove --raw-frames".into());
     }
     Ok(())
 }
 
-/// Refuses what is no YUV4MPEG2, and frames that are too large.
+/// Refuses anything but YUV4MPEG2, and frames that are too large.
 fn check_header(line: &[u8], max_pixels: u64) -> Result<(), String> {
     if line.is_empty() {
-        return Err(
-            "is empty; where ffmpeg should write it, give it -pix_fmt yuv444p, and see what it says".into()
-        );
+        return Err("is empty; if ffmpeg writes it, add -pix_fmt yuv444p and check ffmpeg's messages".into());
     }
     if !line.starts_with(b"YUV4MPEG2") {
-        return Err("is neither a folder, nor a pattern such as 'left/*.png', nor a stream in YUV4MPEG2 \
+        return Err("is neither a folder, nor a pattern such as 'left/*.png', nor a YUV4MPEG2 stream \
                     (ffmpeg: -f yuv4mpegpipe)"
             .into());
     }
@@ -238,16 +236,16 @@ fn check_header(line: &[u8], max_pixels: u64) -> Result<(), String> {
             line.trim_ascii_end().split(|b| *b == b' ').skip(1).find(|word| word.first() == Some(&letter))?;
         std::str::from_utf8(&word[1..]).ok()?.parse::<usize>().ok().filter(|number| *number > 0)
     };
-    let size = number(b'W').zip(number(b'H')).ok_or("its header does not say the size of frames")?;
+    let size = number(b'W').zip(number(b'H')).ok_or("its header lacks the frame size")?;
     check_size(size, max_pixels)
 }
 
-/// What the decoder complains of.
+/// The message for an error of the decoder.
 fn said(error: &y4m::Error) -> String {
     match error {
         y4m::Error::UnknownColorspace => {
-            "its kind of pixels is not supported; let ffmpeg write -pix_fmt gray or yuv444p, or all bits of a grey \
-             camera by -f rawvideo -pix_fmt gray16le for --raw-frames"
+            "its pixel format is not supported; use ffmpeg's -pix_fmt gray or yuv444p, or for all bits of a grey \
+             camera -f rawvideo -pix_fmt gray16le with --raw-frames"
                 .into()
         }
         y4m::Error::EOF => "is cut off".into(),
@@ -256,7 +254,10 @@ fn said(error: &y4m::Error) -> String {
     }
 }
 
-fn yuv_frame(decoder: &mut y4m::Decoder<Counted>, range: Range) -> Result<Option<Raster<'static>>, String> {
+fn yuv_frame(
+    decoder: &mut y4m::Decoder<Counted>,
+    range: LumaRange,
+) -> Result<Option<Raster<'static>>, String> {
     use y4m::Colorspace as C;
     let (width, height) = (decoder.get_width(), decoder.get_height());
     let (colours, bits) = (decoder.get_colorspace(), decoder.get_bit_depth());
@@ -272,7 +273,7 @@ fn yuv_frame(decoder: &mut y4m::Decoder<Counted>, range: Range) -> Result<Option
             if bits == 8 { Samples::Byte(planes[0].to_vec().into()) } else { Samples::Word(words()) };
         Raster::new(width, height, 1, samples)
     } else {
-        // How many pixels share a chroma sample.
+        // Columns and rows of pixels per chroma sample.
         let shared = match colours {
             C::C444 | C::C444p10 | C::C444p12 => (1, 1),
             C::C422 | C::C422p10 | C::C422p12 => (2, 1),
@@ -284,18 +285,18 @@ fn yuv_frame(decoder: &mut y4m::Decoder<Counted>, range: Range) -> Result<Option
     raster.map(Some).map_err(|e| e.to_string())
 }
 
-/// 8-bit RGB from luma and chroma of ITU-R BT.601. Chroma samples count for all the pixels that share them.
+/// Converts luma and chroma of ITU-R BT.601 to 8-bit RGB. Chroma samples apply to all pixels that share them.
 fn to_rgb(
     planes: [&[u8]; 3],
     (width, height): (usize, usize),
     (across, down): (usize, usize),
     bits: usize,
-    range: Range,
+    range: LumaRange,
 ) -> Vec<u8> {
-    // In 1/2^16 of a level of 8 bits: luma from `black` on, and what red, green and blue take of chroma.
+    // In 1/2^16 of an 8-bit level: the luma of black, the scale of luma, and the chroma weights of red, green and blue.
     let (black, luma, [rv, gu, gv, bu]) = match range {
-        Range::Limited => (16, 76_309, [104_597, -25_675, -53_279, 132_201]),
-        Range::Full => (0, 65_536, [91_881, -22_554, -46_802, 116_130]),
+        LumaRange::Limited => (16, 76_309, [104_597, -25_675, -53_279, 132_201]),
+        LumaRange::Full => (0, 65_536, [91_881, -22_554, -46_802, 116_130]),
     };
     let more = bits - 8;
     let sample = |plane: &[u8], at: usize| match more {
@@ -346,7 +347,7 @@ mod tests {
 
     #[test]
     fn colours_are_those_of_the_standard() {
-        // Luma and chroma of black, white, red, green and blue at 75 and 100 %, from the tables of BT.601.
+        // Luma and chroma of black, white and the primaries, from the tables of BT.601.
         let colours = [
             ([16, 128, 128], [0, 0, 0]),
             ([235, 128, 128], [255, 255, 255]),
@@ -356,15 +357,15 @@ mod tests {
         ];
         for (yuv, rgb) in colours {
             let yuv: [u8; 3] = yuv;
-            let found = to_rgb([&yuv[..1], &yuv[1..2], &yuv[2..]], (1, 1), (1, 1), 8, Range::Limited);
+            let found = to_rgb([&yuv[..1], &yuv[1..2], &yuv[2..]], (1, 1), (1, 1), 8, LumaRange::Limited);
             let off = found.iter().zip(rgb).map(|(a, b): (&u8, i32)| (i32::from(*a) - b).abs()).max();
             assert!(off.is_some_and(|off| off <= 2), "{found:?} for {rgb:?}");
-            // Ten bits say the same.
+            // The same colours in 10 bits.
             let words = yuv.map(|v| (4 * u16::from(v)).to_le_bytes());
-            let more = to_rgb([&words[0], &words[1], &words[2]], (1, 1), (1, 1), 10, Range::Limited);
+            let more = to_rgb([&words[0], &words[1], &words[2]], (1, 1), (1, 1), 10, LumaRange::Limited);
             assert_eq!(more, found);
         }
-        let grey = to_rgb([&[77], &[128], &[128]], (1, 1), (1, 1), 8, Range::Full);
+        let grey = to_rgb([&[77], &[128], &[128]], (1, 1), (1, 1), 8, LumaRange::Full);
         assert_eq!(grey, [77; 3]);
     }
 
@@ -372,7 +373,7 @@ mod tests {
     fn chroma_is_shared() {
         let luma = [100; 15];
         let planes: [&[u8]; 3] = [&luma, &[128, 200, 128, 128, 128, 128], &[128; 6]];
-        let rgb = to_rgb(planes, (5, 3), (2, 2), 8, Range::Full);
+        let rgb = to_rgb(planes, (5, 3), (2, 2), 8, LumaRange::Full);
         let blue: Vec<usize> = (0..15).filter(|at| rgb[3 * at + 2] != 100).collect();
         assert_eq!(blue, [2, 3, 7, 8]);
     }

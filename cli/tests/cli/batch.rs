@@ -1,4 +1,4 @@
-//! `mrfgs batch`: the maps of single matches, and every pair exactly once, whatever stops a run on its way.
+//! `mrfgs batch`: the maps equal those of single matches, and every pair is matched exactly once however runs are interrupted.
 
 use std::fmt::Write;
 use std::time::SystemTime;
@@ -7,7 +7,7 @@ use super::*;
 
 const SCENES: [&str; 4] = ["slanted", "steep", "thin", "wall"];
 
-/// A folder with a list of so many pairs, cut from the scenes at different places.
+/// A folder with a list of `count` pairs, cut from the scenes at different places.
 fn pairs(count: usize, (width, height): (u32, u32)) -> Folder {
     let folder = Folder::new();
     let mut list = String::from("name,left,right,max_disparity\n# all are cut from scenes\n");
@@ -30,7 +30,7 @@ fn batch(folder: &Path, args: &str) -> Run {
     run(folder, &format!("batch {args} --device cpu"))
 }
 
-/// The last line of a run, without the number of warnings: cut from scenes, some views hardly overlap.
+/// The last line of a run, without the number of warnings, as some cut views hardly overlap.
 fn summary(told: &Run) -> &str {
     let line = told.stderr.lines().last().unwrap_or_default();
     line.split_once(", 1 with warnings").map_or(line, |(summary, _)| summary)
@@ -40,7 +40,7 @@ fn record(folder: &Path, name: &str) -> Value {
     json(folder.join(format!("{name}.json")))
 }
 
-/// The files of a folder with the times of their last change.
+/// The files of a folder with their modification times.
 fn times(folder: &Path) -> BTreeMap<PathBuf, SystemTime> {
     let time = |path: PathBuf| (path.clone(), fs::metadata(path).unwrap().modified().unwrap());
     listing(folder).into_keys().map(time).collect()
@@ -66,7 +66,7 @@ fn begun(folder: &Path) -> Child {
     started(folder, "batch list.csv out --device cpu --threads 1")
 }
 
-/// Waits until the folder has so many records.
+/// Waits until the folder has this many records.
 fn wait_for(folder: &Path, records: usize) {
     wait_until("at so many records", || names(folder, ".json").len() >= records);
 }
@@ -88,14 +88,14 @@ fn a_batch_is_its_single_matches() {
             assert!(at(&format!("a{end}")) == at(&format!("out/pair-{i}{end}")), "{end} of {i}");
         }
         single(15);
-        assert!(at("a.pfm") != at(&format!("out/pair-{i}.pfm")), "another range is another map");
+        assert!(at("a.pfm") != at(&format!("out/pair-{i}.pfm")), "another range gives another map");
     }
     let record = record(&folder.join("out"), "pair-1");
     assert_eq!(record["status"], "done");
     assert_eq!((&record["labels"], &record["width"]), (&32.into(), &96.into()));
     assert_eq!(record["files"]["output"], "pair-1.pfm");
     assert!(record["density"].as_f64().unwrap() > 90.0 && record["seconds"].as_f64().unwrap() > 0.0);
-    assert_eq!(listing(&folder.join("out")).len(), 15, "nothing else is left");
+    assert_eq!(listing(&folder.join("out")).len(), 15, "no other files");
 
     for format in ["png", "tif"] {
         let name = format!("a.{format}");
@@ -106,7 +106,7 @@ fn a_batch_is_its_single_matches() {
     }
 }
 
-/// Outputs that take the cameras, with the calib.txt beside the left image or in the folder of the pair.
+/// Outputs that need cameras, with the calib.txt beside the left image or in the folder of the pair.
 #[test]
 fn a_batch_writes_depth_and_points() {
     let folder = Folder::new();
@@ -127,18 +127,18 @@ fn a_batch_writes_depth_and_points() {
         let inputs = record(&folder.join(&out), "wall")["request"]["inputs"].to_string();
         assert!(inputs.contains("calib.txt"), "a new calibration is another request: {inputs}");
     }
-    // Points in another format take the place of the old ones.
+    // Points in another format replace the old ones.
     run(&folder, &format!("{args} --also points.las")).succeeded();
     batch(&folder, "data out-data --format tif --also points.las").succeeded();
     assert!(at("one.points.las") == at("out-data/wall.points.las"));
     assert!(!folder.join("out-data/wall.points.ply").exists());
     fs::remove_file(folder.join("data/wall/calib.txt")).unwrap();
     let told = batch(&folder, &format!("list.csv none {also}"));
-    told.says("wall: --also depth: takes the cameras, and there is no calib.txt");
+    told.says("wall: --also depth: needs camera values, but there is no calib.txt");
     assert_eq!(told.code, Some(1));
 }
 
-/// Calibrations of all pairs, or of some in the list; raw pairs are rectified as `match` rectifies them.
+/// Calibrations for all pairs or for single ones in the list; raw pairs are rectified as by `match`.
 #[test]
 fn a_batch_takes_calibrations() {
     let folder = Folder::new();
@@ -159,7 +159,7 @@ fn a_batch_takes_calibrations() {
     for (row, calib, out) in [
         ("raw,raw/left.png,raw/right.png,40,", "--calib raw/cameras.yml", "flag"),
         ("raw,raw/left.png,raw/right.png,40,raw/cameras.yml", "", "column"),
-        // That of the list counts.
+        // The calibration in the list takes precedence.
         ("raw,raw/left.png,raw/right.png,40,raw/cameras.yml", "--calib none.yml", "both"),
     ] {
         list(row);
@@ -178,19 +178,19 @@ fn a_batch_takes_calibrations() {
     // Another rectification is another request.
     batch(&folder, "list.csv column --rectify --also depth").succeeded().says("1 done");
     assert!(at("one.pfm") != at("column/raw.pfm"));
-    // What is not rectified is no calibration of rectified images; and what has none cannot be rectified.
+    // Unrectified cameras give no depth of rectified images, and a pair without a calibration cannot be rectified.
     let told = batch(&folder, "list.csv raw-pair --also depth");
-    told.says("raw: cannot read raw/cameras.yml: is of images that are not rectified");
+    told.says("raw: cannot read raw/cameras.yml: describes images that are not rectified");
     assert_eq!(told.code, Some(1));
     list("raw,raw/left.png,raw/right.png,40,");
     let told = batch(&folder, "list.csv none --rectify");
-    told.says("raw: --rectify: takes a calibration; give one in the column calibration");
+    told.says("raw: --rectify: needs a calibration; give one per pair in the column calibration");
     assert_eq!(told.code, Some(1));
     batch(&folder, "list.csv none --alpha 1").failed(2, "--alpha & --rectify");
 }
 
 #[test]
-fn complete_pairs_are_skipped_until_what_they_are_of_changes() {
+fn complete_pairs_are_skipped_until_their_request_changes() {
     let folder = pairs(3, (64, 48));
     let out = folder.join("out");
     let again = |args: &str, said: &str| {
@@ -202,12 +202,12 @@ fn complete_pairs_are_skipped_until_what_they_are_of_changes() {
     again("", "0 done, 3 skipped, 0 failed");
     assert!((listing(&out), times(&out)) == before, "finished files are not touched");
 
-    // Each of these makes another map of what it concerns.
+    // Each of these changes invalidates the pairs that it concerns.
     fs::remove_file(out.join("pair-0.json")).unwrap();
     again("", "1 done, 2 skipped, 0 failed");
     fs::remove_file(out.join("pair-1.pfm")).unwrap();
     again("", "1 done, 2 skipped, 0 failed");
-    // A map that is there and not whole, as after a power cut on some file systems.
+    // A truncated map, as after a power failure on some file systems.
     let whole = fs::read(out.join("pair-1.pfm")).unwrap();
     for cut in [&[][..], &whole[..whole.len() - 1]] {
         fs::write(out.join("pair-1.pfm"), cut).unwrap();
@@ -223,7 +223,7 @@ fn complete_pairs_are_skipped_until_what_they_are_of_changes() {
     again("--set temperature=0.3", "3 done, 0 skipped, 0 failed");
     assert!(names(&out, ".validity.png").is_empty(), "maps of an earlier request go with its record");
     again("--set temperature=0.3", "0 done, 3 skipped, 0 failed");
-    // The record of another version.
+    // A record of another version.
     let text = fs::read_to_string(out.join("pair-2.json")).unwrap();
     let version = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
     assert!(text.contains(&version));
@@ -245,14 +245,14 @@ fn a_killed_batch_resumes() {
         wait_for(&out, records);
         child.kill().unwrap();
         killed += usize::from(!child.wait_with_output().unwrap().status.success());
-        // What is complete is whole.
+        // Complete pairs have complete files.
         for name in names(&out, ".json") {
             assert_eq!(record(&out, &name)["status"], "done");
             assert!(fs::read(out.join(format!("{name}.pfm"))).unwrap() == whole[&name], "{name}");
         }
     }
-    assert_eq!(killed, 4, "all runs were killed on their way");
-    // As a run leaves it that is killed in the middle of a pair.
+    assert_eq!(killed, 4, "all runs were killed early");
+    // Remains of a run killed in the middle of a pair.
     fs::create_dir_all(out.join(".pair-19.tmp")).unwrap();
     fs::write(out.join(".pair-19.tmp/pair-19.pfm"), "half").unwrap();
     let (complete, before) = (names(&out, ".json"), times(&out));
@@ -267,12 +267,12 @@ fn a_killed_batch_resumes() {
             assert_eq!(after[&file], before[&file], "{name} was not run again");
         }
     }
-    assert_eq!(after.len(), 40, "nothing else is left: {:?}", after.keys());
+    assert_eq!(after.len(), 40, "no other files: {:?}", after.keys());
 }
 
 #[test]
 fn runs_at_the_same_time_share_the_pairs() {
-    // Long enough that none does it all before the others begin.
+    // Enough pairs that no run finishes before the others start.
     let folder = pairs(30, (160, 120));
     batch(&folder, "list.csv single").succeeded();
     let whole = maps(&folder.join("single"));
@@ -287,15 +287,15 @@ fn runs_at_the_same_time_share_the_pairs() {
         assert_eq!(done + skipped, 30, "{said}");
         done
     });
-    assert_eq!(done.iter().sum::<usize>(), 30, "each pair once: {done:?}");
+    assert_eq!(done.iter().sum::<usize>(), 30, "every pair once: {done:?}");
     assert!(done.iter().filter(|&&done| done > 0).count() > 1, "{done:?}");
     assert!(maps(&out) == whole);
-    assert_eq!(listing(&out).len(), 60, "nothing else is left");
+    assert_eq!(listing(&out).len(), 60, "no other files");
 }
 
 #[cfg(unix)]
 #[test]
-fn an_interrupted_batch_tidies_up() {
+fn an_interrupted_batch_cleans_up() {
     let folder = pairs(12, (160, 120));
     let out = folder.join("out");
     let signals: &[(&str, usize)] = if cfg!(target_os = "linux") {
@@ -308,7 +308,7 @@ fn an_interrupted_batch_tidies_up() {
         wait_for(&out, records);
         send(signal, &child);
         if records > 4 {
-            // A terminal that is gone says so twice: by the system and by the shell; a limit of time, every second.
+            // A closed terminal signals twice, from the system and the shell; a time limit signals every second.
             send(signal, &child);
         }
         let output = child.wait_with_output().unwrap();
@@ -316,9 +316,9 @@ fn an_interrupted_batch_tidies_up() {
         assert_eq!(output.status.code(), Some(130), "{said}");
         let complete = names(&out, ".json").len();
         assert_eq!(said, format!("mrfgs: stopped after {complete} of 12; run it again to resume\n"));
-        assert_eq!(listing(&out).len(), 2 * complete, "nothing half written is left");
+        assert_eq!(listing(&out).len(), 2 * complete, "no incomplete files");
     }
-    // SIGHUP is ignored, like under `nohup`.
+    // SIGHUP is ignored, as under `nohup`.
     let mut child = Command::new("sh");
     child.args(["-c", "trap '' HUP && exec \"$0\" batch list.csv out --device cpu --threads 1"]);
     child.arg(env!("CARGO_BIN_EXE_mrfgs")).current_dir(&*folder).stderr(Stdio::null());
@@ -329,9 +329,9 @@ fn an_interrupted_batch_tidies_up() {
     assert_eq!(listing(&out).len(), 24);
 }
 
-/// A fault of one pair's files in the output folder fails that pair alone.
+/// An obstacle to one pair's files in the output folder only fails that pair.
 #[test]
-fn a_record_that_cannot_be_written_fails_its_pair_alone() {
+fn a_record_that_cannot_be_written_fails_only_its_pair() {
     let folder = pairs(4, (64, 48));
     let out = folder.join("out");
     fs::create_dir_all(out.join("pair-0.json/full")).unwrap();
@@ -350,9 +350,9 @@ fn a_record_that_cannot_be_written_fails_its_pair_alone() {
     batch(&folder, "list.csv out").succeeded().says("3 done, 1 skipped, 0 failed");
 }
 
-/// A run that resumes leaves what a run from the beginning would have made.
+/// A resumed run leaves the same files as a complete one.
 #[test]
-fn a_flag_that_changes_an_output_makes_it_anew() {
+fn a_flag_that_changes_an_output_recomputes_it() {
     let folder = pairs(1, (64, 48));
     for (flags, anew) in [
         ("--also preview", true),
@@ -403,7 +403,7 @@ fn a_bad_pair_does_not_stop_the_others() {
     assert_eq!(told.code, Some(1));
     told.says("1 done, 2 skipped, 1 failed: pair-2;");
     assert_eq!(record(&out, "pair-1")["status"], "done");
-    // What no format holds is a fault of the pair too.
+    // A range that the format cannot store also fails only its pair.
     let list = fs::read_to_string(folder.join("list.csv")).unwrap();
     fs::write(folder.join("list.csv"), list.replacen(",31\n", ",300\n", 1)).unwrap();
     let told = batch(&folder, "list.csv out --format png");
@@ -412,7 +412,7 @@ fn a_bad_pair_does_not_stop_the_others() {
 }
 
 #[test]
-fn shards_are_disjoint_and_make_the_whole() {
+fn shards_are_disjoint_and_complete() {
     let folder = pairs(9, (64, 48));
     batch(&folder, "list.csv whole").succeeded();
     let mut found = Vec::new();
@@ -425,9 +425,9 @@ fn shards_are_disjoint_and_make_the_whole() {
     }
     found.sort();
     let whole = folder.join("whole");
-    assert_eq!(found, names(&whole, ".json"), "each pair is in exactly one shard");
+    assert_eq!(found, names(&whole, ".json"), "every pair is in exactly one shard");
     assert!(maps(&folder.join("together")) == maps(&whole));
-    // More pairs move none of the others.
+    // New pairs do not move the others.
     let list = fs::read_to_string(folder.join("list.csv")).unwrap();
     let more = list.replacen("pair-0,", "new,images/0-left.png,images/0-right.png,31\npair-0,", 1);
     fs::write(folder.join("list.csv"), more).unwrap();
@@ -443,7 +443,7 @@ fn shards_are_disjoint_and_make_the_whole() {
 }
 
 #[test]
-fn status_tells_and_runs_nothing() {
+fn status_reports_and_runs_nothing() {
     let folder = pairs(4, (64, 48));
     let before = listing(&folder);
     let status = || batch(&folder, "list.csv out --status").succeeded().stdout;
@@ -455,7 +455,7 @@ fn status_tells_and_runs_nothing() {
     fs::write(&image, "").unwrap();
     assert_eq!(batch(&folder, "list.csv out").code, Some(1));
     fs::remove_file(folder.join("out/pair-1.json")).unwrap();
-    // A script that asks must hear of it.
+    // The exit status tells scripts about failures.
     let failed = batch(&folder, "list.csv out --status");
     assert_eq!(failed.code, Some(1));
     failed.says("1 of 4 failed");
@@ -469,7 +469,7 @@ fn status_tells_and_runs_nothing() {
     batch(&folder, "list.csv out").succeeded();
     assert_eq!(status(), all("complete") + "4 complete, 0 failed, 0 missing\n");
     let other = batch(&folder, "list.csv out --status --also validity").succeeded().stdout;
-    assert!(other.ends_with("0 complete, 0 failed, 4 missing\n"), "of other maps: {other}");
+    assert!(other.ends_with("0 complete, 0 failed, 4 missing\n"), "for another format: {other}");
 }
 
 #[test]
@@ -502,7 +502,7 @@ fn the_folders_in_a_folder_are_pairs() {
     batch(&folder, "data out").says("0 done, 2 skipped, 1 failed: empty;");
     batch(&folder, "data data/out").failed(2, "data/out & the folder of the pairs & give another");
     fs::remove_dir(folder.join("data/empty")).unwrap();
-    // Whatever file systems allow is a name.
+    // Any valid file name is accepted.
     for name in ["two words", "straße №1 (ä) 日本"] {
         copy("wall", &folder.join("data").join(name));
     }
@@ -520,23 +520,23 @@ fn a_bad_list_is_refused_before_anything_runs() {
     let folder = pairs(1, (64, 48));
     let long = format!("name,left,right\n{},l,r\n", "n".repeat(201));
     let lists = [
-        ("", "lists no pair & CSV"),
-        ("name,left,right\n\n# nothing\n", "lists no pair"),
-        ("a,l,r\n", "line 1 & `a` is no column & name, left, right, max_disparity"),
-        ("name,left,left\n", "line 1 & two columns left"),
-        ("name,left,max_disparity\n", "line 1 & no column right"),
-        ("name,left,right\na,l,r\n\n# comment\nb,l\n", "line 5 & 2 fields and 3 columns"),
-        ("name,left,right\na,l,r,31\n", "line 2 & 4 fields and 3 columns"),
+        ("", "contains no pairs & CSV"),
+        ("name,left,right\n\n# nothing\n", "contains no pairs"),
+        ("a,l,r\n", "line 1 & unknown column `a` & name, left, right, max_disparity"),
+        ("name,left,left\n", "line 1 & the column left appears twice"),
+        ("name,left,max_disparity\n", "line 1 & the column right is missing"),
+        ("name,left,right\na,l,r\n\n# comment\nb,l\n", "line 5 & 2 fields but 3 columns"),
+        ("name,left,right\na,l,r,31\n", "line 2 & 4 fields but 3 columns"),
         ("name,left,right\na,,r\n", "line 2 & left is missing"),
         ("name,left,right\na,l.jpg,\n", "line 2 & right is missing"),
         ("name,left,right\n,l,r\n", "line 2 & name is missing"),
         ("name,left,right\na,l,r\nA,l,r\n", "line 3 & name A is taken by line 2 & rename"),
-        ("name,left,right\n../a,l,r\n", "line 2 & `../a` is no name for files & rename"),
-        ("name,left,right\n.a,l,r\n", "line 2 & `.a` is no name"),
-        ("name,left,right\n-a,l,r\n", "line 2 & `-a` is no name"),
-        ("name,left,right\na\u{1b}b,l,r\n", "line 2 & is no name"),
-        ("name,left,right\na.,l,r\n", "line 2 & `a.` is no name & . or space last"),
-        ("name,left,right\nwhat?,l,r\n", "line 2 & `what?` is no name"),
+        ("name,left,right\n../a,l,r\n", "line 2 & `../a` cannot be a file name & rename"),
+        ("name,left,right\n.a,l,r\n", "line 2 & `.a` cannot be a file name"),
+        ("name,left,right\n-a,l,r\n", "line 2 & `-a` cannot be a file name"),
+        ("name,left,right\na\u{1b}b,l,r\n", "line 2 & cannot be a file name"),
+        ("name,left,right\na.,l,r\n", "line 2 & `a.` cannot be a file name & no trailing . or space"),
+        ("name,left,right\nwhat?,l,r\n", "line 2 & `what?` cannot be a file name"),
         ("name,left,right\nÄ,l,r\nä,l,r\n", "line 3 & name ä is taken by line 2"),
         ("name,left,right\na.Validity,l,r\n", "line 2 & ends in .validity & rename"),
         (&*long, "line 2 & at most 200"),
@@ -554,7 +554,7 @@ fn a_bad_list_is_refused_before_anything_runs() {
     }
     fs::write(folder.join("bad.csv"), b"name,left,right\n\xff,l,r\n").unwrap();
     batch(&folder, "bad.csv out").failed(1, "bad.csv & UTF-8");
-    // Quotes, spaces, columns in another order, a byte order mark, the line ends of another system.
+    // Quotes, spaces, another order of columns, a byte order mark, and Windows line ends.
     let good = "\u{feff}mask,right, left ,name\r\n,\"images/0-right.png\",images/0-left.png,a\r\n";
     fs::write(folder.join("good.csv"), good).unwrap();
     assert_eq!(batch(&folder, "good.csv out").succeeded().stderr, "mrfgs: 1 done, 0 skipped, 0 failed\n");

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_bench_gives_every_figure_of_both_backends() {
+fn a_bench_reports_all_figures_of_both_backends() {
     let folder = workshop();
     let backends = if has_gpu() { &["cpu", "gpu"][..] } else { &["cpu"] };
     let line = "bench misfit without-disp0GT.pfm --repeats 2 --json out.json --threads 2 --set levels=1";
@@ -24,7 +24,7 @@ fn a_bench_gives_every_figure_of_both_backends() {
         assert_eq!(pair["labels"], 32, "{what}");
         told.prints(&format!("{what}: {width} x {height} pixels, 32 labels"));
         let method = &json["methods"][preset];
-        assert_eq!(method["graph"]["levels"], 1, "--set counts for every preset");
+        assert_eq!(method["graph"]["levels"], 1, "--set applies to every preset");
         assert_eq!(pair["devices"].as_object().unwrap().len(), backends.len());
 
         for &backend in backends {
@@ -50,7 +50,7 @@ fn a_bench_gives_every_figure_of_both_backends() {
             let kept = found["labels_kept"][0].as_f64().unwrap() / 100.0;
             assert!(kept > 0.0 && (kept <= 1.0 && preset == "paper" || close(kept, 1.0)), "{what}: {kept}");
             let message_values = value("message_bytes") / (iterations * cells * kept);
-            // Where messages and beliefs come in one sweep, the five messages are not read once more.
+            // If a sweep computes messages and beliefs together, the five messages are not read again.
             let swept = if backend == "cpu" { 5.0 } else { 0.0 };
             assert!(close(message_values, (17.0 - swept) * wide + 1.0), "{message_values}");
             for (key, count, time) in [
@@ -81,7 +81,7 @@ fn a_bench_gives_every_figure_of_both_backends() {
                 assert!(value("peak_bytes") > cells, "{what}, {backend}");
             }
         }
-        // The same bits take the same work.
+        // Equal results need equal work.
         for key in ["iterations", "label_updates", "plan_bytes"] {
             let of = |backend: &&str| &pair["devices"][*backend][key];
             assert!(backends.iter().all(|backend| of(backend) == of(&"cpu")), "{what}: {key}");
@@ -96,7 +96,7 @@ fn a_bench_gives_every_figure_of_both_backends() {
 }
 
 #[test]
-fn a_bench_without_folders_makes_up_its_pair() {
+fn a_bench_without_folders_generates_its_pair() {
     let folder = Folder::new();
     let told = run(&folder, "bench --method default --device cpu --repeats 1 --set levels=1").succeeded();
     told.prints("small, method default: 450 x 375 pixels, 60 labels");

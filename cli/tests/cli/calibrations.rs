@@ -1,16 +1,15 @@
-//! Calibrations that people have: each format gives the same pair and the same depths, and what is wrong in a file is told in
-//! one line.
+//! Calibrations in common formats: each gives the same pair and the same depths, and faults in a file are reported in one line.
 
 use mrfgs::rectification::{Options, Rectification};
 
 use super::*;
 
-/// That of `testdata/raw`, as OpenCV has it in YAML.
+/// The calibration of `testdata/raw` in OpenCV's YAML.
 pub(super) fn opencv() -> String {
     fs::read_to_string(scene("raw/cameras.yml")).unwrap()
 }
 
-/// The numbers of an entry of it.
+/// The numbers of one of its entries.
 pub(super) fn numbers(name: &str) -> Vec<String> {
     let text = opencv();
     let entry = text.split(&format!("\n{name}: ")).nth(1).unwrap();
@@ -18,7 +17,7 @@ pub(super) fn numbers(name: &str) -> Vec<String> {
     data.split(", ").map(str::to_owned).collect()
 }
 
-/// The same in XML.
+/// The same calibration in OpenCV's XML.
 fn xml() -> String {
     let mut text =
         "<?xml version=\"1.0\"?>\n<opencv_storage>\n<imageSize>\n  240 180</imageSize>\n<unit>m</unit>\n"
@@ -33,7 +32,7 @@ fn xml() -> String {
     text + "</opencv_storage>\n"
 }
 
-/// The same of Kalibr.
+/// The same calibration in Kalibr's format.
 fn kalibr() -> String {
     let camera = |n: usize| {
         let (k, d) = (numbers(&format!("K{n}")), numbers(&format!("D{n}")));
@@ -54,14 +53,14 @@ fn kalibr() -> String {
     camera(1) + &camera(2) + &pose
 }
 
-/// One of ROS's two, for images that are rectified already.
+/// One of ROS's two files, for images that are already rectified.
 fn ros(tx: &str) -> String {
     format!(
         "image_width: 240\nimage_height: 180\ncamera_name: some\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [215.5, 0, 118.5, 0, 215.5, 89.5, 0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [0, 0, 0, 0, 0]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nprojection_matrix:\n  rows: 3\n  cols: 4\n  data: [215.5, 0, 118.5, {tx}, 0, 215.5, 89.5, 0, 0, 0, 1, 0]\n"
     )
 }
 
-/// Flags that name these calibrations.
+/// Flags that select these calibration files.
 fn calib(files: &str) -> String {
     format!(" --calib {}", files.replace(' ', " --calib "))
 }
@@ -97,12 +96,12 @@ fn every_format_rectifies_alike() {
 }
 
 #[test]
-fn rectified_first_or_on_the_way_gives_the_same_bits() {
+fn rectifying_before_or_within_match_gives_the_same_bits() {
     let folder = Folder::new();
     rectify(&folder, "@raw/cameras.yml").succeeded();
     let end = "--max-disparity 40 --device cpu --also validity,depth-mm,points";
     let raw = "@raw/left.png @raw/right.png a.pfm --rectify --calib @raw/cameras.yml --json a.json";
-    // OpenCV's form of the calibration says the same.
+    // The calibration in OpenCV's format is equivalent.
     let rectified = "out/im0.png out/im1.png";
     for pair in [raw, &format!("{rectified} b.pfm"), &format!("{rectified} c.pfm --calib out/cameras.yml")] {
         run(&folder, &format!("match {pair} {end}")).succeeded();
@@ -117,14 +116,14 @@ fn rectified_first_or_on_the_way_gives_the_same_bits() {
     let record = json(folder.join("a.json"));
     assert_eq!(record["rectified"], true);
     assert_eq!(record["files"]["calibration"], scene("raw/cameras.yml").to_str().unwrap());
-    // Depths are in metres, and 16-bit ones in millimetres.
+    // Depths are in metres, 16-bit ones in millimetres.
     let pixels = image::open(folder.join("a.depth-mm.png")).unwrap().into_luma16();
     let known = || pixels.pixels().map(|p| p.0[0]).filter(|mm| *mm > 0);
     let (least, most) = (known().min().unwrap(), known().max().unwrap());
     assert!((1000..2000).contains(&least) && (2500..6000).contains(&most), "{least} to {most}");
 }
 
-/// The pixel at which the left camera of `testdata/raw` shows a point, by the numbers of its calibration.
+/// The pixel of a point in the left camera of `testdata/raw`, by the numbers of its calibration.
 fn seen([x, y, z]: [f64; 3], k: &[f64], d: &[f64]) -> [f64; 2] {
     let [a, b] = [x / z, y / z];
     let r2 = a * a + b * b;
@@ -135,7 +134,7 @@ fn seen([x, y, z]: [f64; 3], k: &[f64], d: &[f64]) -> [f64; 2] {
 }
 
 #[test]
-fn points_of_the_original_camera_are_seen_at_their_pixels() {
+fn points_in_the_original_frame_project_to_their_pixels() {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
     let raw = |output: &str| format!("@raw/left.png @raw/right.png {output} --calib @raw/cameras.yml");
@@ -165,7 +164,7 @@ fn points_of_the_original_camera_are_seen_at_their_pixels() {
     };
     let most = misses("a.points-original.ply").into_iter().fold(0.0, f64::max);
     assert!(most < 1e-4, "{most} px");
-    // Control: the points of the rectified frame are seen elsewhere.
+    // Control: points of the rectified frame project elsewhere.
     let least = misses("a.points.ply").into_iter().fold(f64::INFINITY, f64::min);
     assert!(least > 0.5, "{least} px");
     println!("{most:.1e} px at most, {least:.2} px at least in the rectified frame");
@@ -187,7 +186,7 @@ fn every_format_gives_the_same_depths() {
         fs::read(folder.join("d.depth-mm.png")).unwrap()
     };
     let first = depths("txt");
-    // KITTI's pairs in grey and in colour, of which one is twice as far apart.
+    // KITTI's grey and colour pairs, one with twice the baseline.
     let kitti = |text: &str, columns: [&str; 4]| {
         let row = |(n, tx): (usize, &str)| {
             format!("P{n}: 2.155e+02 0 1.185e+02 {tx} 0 2.155e+02 8.95e+01 0 0 0 1 0\n")
@@ -203,7 +202,7 @@ fn every_format_gives_the_same_depths() {
     }
 }
 
-/// What is changed in which file, and what the line must say beside the name of the file.
+/// The file to change, the text and its replacement, and words of the error besides the file name.
 type Row = (&'static str, &'static str, &'static str, &'static str);
 
 const WRONG: &[Row] = &[
@@ -281,7 +280,7 @@ const WRONG: &[Row] = &[
 ];
 
 #[test]
-fn what_is_wrong_in_a_calibration_is_told() {
+fn faults_in_a_calibration_are_reported() {
     let folder = Folder::new();
     fs::write(folder.join("left"), ros("0")).unwrap();
     for (kind, from, to, words) in WRONG {
@@ -296,11 +295,11 @@ fn what_is_wrong_in_a_calibration_is_told() {
         fs::write(folder.join("a-file"), text.replacen(from, to, 1)).unwrap();
         let told = rectify(&folder, if *kind == "ros" { "left a-file" } else { "a-file" });
         told.failed(1, &format!("a-file & {words}"));
-        assert_eq!(listing(&folder).len(), 2, "{what}: nothing is left");
+        assert_eq!(listing(&folder).len(), 2, "{what}: no output");
     }
 }
 
-/// The share of pixels by which two pictures differ by more than a level.
+/// The share of pixels that differ by more than one level between two pictures.
 fn differing(folder: &Folder, a: &str, b: &str) -> f64 {
     let [a, b] = [a, b].map(|name| image::open(folder.join(name)).unwrap().to_rgb8());
     assert_eq!(a.dimensions(), b.dimensions());
@@ -309,7 +308,7 @@ fn differing(folder: &Folder, a: &str, b: &str) -> f64 {
 }
 
 #[test]
-fn cameras_that_are_exchanged_are_taken_for_each_other() {
+fn swapped_cameras_are_exchanged() {
     let folder = Folder::new();
     let rig = forms::Rig::new();
     let back = mrfgs::calibration::matrix::transposed(&rig.r);
@@ -318,7 +317,7 @@ fn cameras_that_are_exchanged_are_taken_for_each_other() {
     fs::write(folder.join("rig.yml"), rig.opencv("")).unwrap();
     fs::write(folder.join("exchanged.yml"), exchanged.opencv("")).unwrap();
     run(&folder, "rectify @raw/left.png @raw/right.png expected --calib rig.yml --quiet").succeeded();
-    // The images are in the order of their places, and in that of the file.
+    // Images in the order of the cameras' positions, and in the order of the file.
     let told =
         "exchanged.yml: has the right camera on the left of the left one, so each was taken for the other";
     for (images, out, words) in [
@@ -335,12 +334,12 @@ fn cameras_that_are_exchanged_are_taken_for_each_other() {
             assert!(share < 0.01, "{out}/{name}: {share}");
         }
     }
-    // Control: the views themselves differ.
+    // Control: the views differ.
     assert!(differing(&folder, "expected/im0.png", "expected/im1.png") > 0.5);
 }
 
 #[test]
-fn images_of_another_size_are_told() {
+fn images_of_another_size_are_reported() {
     let folder = Folder::new();
     let text = opencv();
     for (name, size) in
@@ -360,7 +359,7 @@ fn images_of_another_size_are_told() {
     let outside = "--calib-crop & odd.yml & 240 x 200 & not inside";
     run(&folder, &format!("{images} out --calib odd.yml --calib-crop 0,21,240,180")).failed(2, outside);
     run(&folder, &format!("{images} out --calib-crop 0,0,240,180")).failed(2, "--calib");
-    // One camera's images are twice as large.
+    // The images of one camera are twice as large.
     let right = image::open(scene("raw/right.png")).unwrap();
     right.resize(480, 360, image::imageops::FilterType::Nearest).save(folder.join("right.png")).unwrap();
     run(&folder, "rectify @raw/left.png right.png two --calib fits.yml")
@@ -417,7 +416,7 @@ fn mpo([left, right]: [Vec<u8>; 2]) -> Vec<u8> {
 }
 
 #[test]
-fn a_unit_that_hardly_any_cameras_have_is_told() {
+fn an_implausible_unit_is_reported() {
     let folder = Folder::new();
     fs::write(folder.join("left"), ros("0")).unwrap();
     let depth = |right: &str, out: &str| {
@@ -429,11 +428,11 @@ fn a_unit_that_hardly_any_cameras_have_is_told() {
     depth(&ros("-34.48"), "d.pfm").is_silent_on("apart");
     depth(&ros("-0.03448"), "small.pfm").says(&format!("warning & 0.00016 m apart {remedy}"));
     depth(&ros("-34480"), "large.pfm").says(&format!("warning & 160 m apart {remedy}"));
-    // The remedy.
+    // The suggested remedy works.
     depth(&(ros("-34480") + "unit: mm\n"), "again.pfm").is_silent_on("apart");
     let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
     assert!(bytes("d.depth-mm.png") == bytes("again.depth-mm.png"));
-    // Elsewhere.
+    // Other commands warn too.
     for line in [
         "depth d.pfm e.pfm --calib left --calib right --also depth",
         "rectify @slanted/im0.png @slanted/im1.png out --calib left --calib right",
@@ -450,7 +449,7 @@ fn a_unit_that_hardly_any_cameras_have_is_told() {
     run(&folder, "depth d.pfm h.pfm --focal 215 --baseline 16cm").succeeded().is_silent_on("warning");
 }
 
-/// A rectification for `testdata/raw` of its own making, with the lenses and the pose that it is of.
+/// The calibration of `testdata/raw` with a precomputed rectification, and the lenses and pose it belongs to.
 pub(super) fn stored() -> String {
     let by = mrfgs::calibration::of_texts(&[(Path::new("cameras"), opencv())]).unwrap();
     let by = Rectification::new(&by, (240, 180), &Options::default()).unwrap();
@@ -492,9 +491,9 @@ pub(super) fn turned(text: &str, name: &str, degrees: f64) -> String {
     })
 }
 
-/// A calibration that does not say the size of its images, and has the optical axis far from the middle of these.
+/// A calibration without an image size whose optical axis is far from the image centre.
 #[test]
-fn a_calibration_for_another_size_is_told() {
+fn a_calibration_for_another_size_is_reported() {
     let folder = Folder::new();
     let silent = opencv().replace("imageSize: [ 240, 180 ]", "").replace("121.4,", "150.0,");
     fs::write(folder.join("a-file"), &silent).unwrap();
@@ -504,7 +503,7 @@ fn a_calibration_for_another_size_is_told() {
          images of 240 x 180",
     );
     told.says("add imageSize: [240, 180] if this is right");
-    // Where the size is stated, or the axis is in the middle, nothing is said.
+    // No warning if the size is stated or the axis is near the centre.
     for text in [silent.replace("unit: m", "imageSize: [ 240, 180 ]"), silent.replace("150.0,", "121.4,")] {
         fs::remove_dir_all(folder.join("out")).unwrap();
         fs::write(folder.join("a-file"), text).unwrap();
@@ -513,9 +512,9 @@ fn a_calibration_for_another_size_is_told() {
     }
 }
 
-/// Projections of another size than that of the images.
+/// Projections for images of another size.
 #[test]
-fn a_rectification_of_another_size_is_made_or_doubted() {
+fn a_rectification_of_another_size_is_used_or_doubted() {
     let folder = Folder::new();
     let doubled = |numbers: &[f64]| numbers.iter().take(11).map(|v| 2.0 * v).chain([0.0]).collect::<Vec<_>>();
     let doubled = |numbers: &[f64]| {
@@ -535,7 +534,7 @@ fn a_rectification_of_another_size_is_made_or_doubted() {
     let told = rectify(&folder, "silent").succeeded();
     told.says("warning: silent: shows the middle of the images at (2");
     told.says("in rectified views of 240 x 180 & newImageSize: [4");
-    // A rectification that is chosen has the size of the images.
+    // A newly computed rectification has the size of the images.
     fs::remove_dir_all(folder.join("out")).unwrap();
     run(&folder, "rectify @raw/left.png @raw/right.png out --calib stated --alpha 0")
         .succeeded()
@@ -544,13 +543,13 @@ fn a_rectification_of_another_size_is_made_or_doubted() {
 
 /// Cameras that look past each other.
 #[test]
-fn a_view_that_shows_nothing_is_told() {
+fn an_empty_view_is_reported() {
     let folder = Folder::new();
     fs::write(folder.join("a-file"), turned(&opencv(), "R", 70.0)).unwrap();
     rectify(&folder, "a-file").failed(1, "a-file & view of which & % shows the image & check its rotations");
 }
 
-/// KITTI's `calib_cam_to_cam.txt` of the cameras of `testdata/raw`: the colour ones, which stand away from camera 0.
+/// KITTI's `calib_cam_to_cam.txt` for the cameras of `testdata/raw` as colour cameras, away from camera 0.
 fn kitti() -> String {
     let row = |name: &str, numbers: &[f64]| {
         let numbers = numbers.iter().map(|v| format!("{v:.15e}")).collect::<Vec<_>>();
@@ -581,7 +580,7 @@ fn kitti() -> String {
         out += &row(&name("T"), &translation);
         out += &row(&name("S_rect"), &[240.0, 180.0]);
         out += &row(&name("R_rect"), &of(&text, &format!("R{n}")));
-        // The origin is camera 0, which is not in the plane of the image either.
+        // The origin is camera 0, which is not in the image plane either.
         let mut p = of(&text, &format!("P{n}"));
         let (f, cx, cy, z) = (p[0], p[2], p[6], 0.003);
         p[3] += 0.06 * f + cx * z;
@@ -592,7 +591,7 @@ fn kitti() -> String {
     out
 }
 
-/// Whether two folders hold rectified pairs that differ by no more than the last bits of their calibrations.
+/// Whether two folders contain rectified pairs that only differ by rounding of their calibrations.
 pub(super) fn alike(a: &Path, b: &Path, what: &str) {
     for file in ["im0.png", "im1.png"] {
         let [a, b] = [a, b].map(|folder| image::open(folder.join(file)).unwrap().into_rgba8());
@@ -635,7 +634,7 @@ fn kitti_is_read() {
 }
 
 #[test]
-fn files_that_are_no_calibration_are_told() {
+fn other_files_are_not_taken_for_a_calibration() {
     let folder = Folder::new();
     let (keys, elements) = ((0..2000).map(|n| format!("k{n}: 1\n")), (0..2000).map(|n| format!("<k{n}/>")));
     let (deep, lists) = (("<b>".repeat(2000), "</b>".repeat(2000)), ("[".repeat(40), "]".repeat(40)));
@@ -673,9 +672,9 @@ fn files_that_are_no_calibration_are_told() {
     }
 }
 
-/// What is none is refused by every command that takes a calibration; `tests/calibrations` of the library goes through many more.
+/// Every command with a calibration refuses other files; `tests/calibrations` of the library has many more cases.
 #[test]
-fn no_command_takes_what_is_no_calibration() {
+fn every_command_refuses_files_without_a_calibration() {
     let folder = Folder::new();
     let write = |name: &str, bytes: &[u8]| fs::write(folder.join(name), bytes).unwrap();
     write("readme.md", b"# Stereo\n\nIt matches.\n");
@@ -712,14 +711,14 @@ fn no_command_takes_what_is_no_calibration() {
         ] {
             let run = run(&folder, &line);
             run.failed(1, words);
-            assert!(listing(&folder) == before, "{line}: nothing is left");
+            assert!(listing(&folder) == before, "{line}: no output");
         }
     }
-    // Control: the calibration by itself.
+    // Control: the calibration alone is accepted.
     run(&folder, &format!("rectify {raw} out{}", calib("@raw/cameras.yml"))).succeeded();
 }
 
-/// A calib.txt beside the left image counts as one that is given, in whatever form.
+/// A calib.txt beside the left image is treated like one given by --calib, in any format.
 #[test]
 fn a_calibration_beside_the_images_may_have_any_form() {
     let folder = Folder::new();
@@ -736,7 +735,7 @@ fn a_calibration_beside_the_images_may_have_any_form() {
     let row =
         |n: usize, tx: &str| format!("P{n}: 2.155e+02 0 1.185e+02 {tx} 0 2.155e+02 8.95e+01 0 0 0 1 0\n");
     assert!(depths(&(row(0, "0") + &row(1, "-34.48"))) == middlebury);
-    // Control: another baseline.
+    // Control: another baseline gives other depths.
     assert!(depths(&(row(0, "0") + &row(1, "-30"))) != middlebury);
     for (text, words) in [("some words\n", "is no calibration of a known form"), ("", "is empty")] {
         fs::write(folder.join("calib.txt"), text).unwrap();
@@ -745,9 +744,9 @@ fn a_calibration_beside_the_images_may_have_any_form() {
     }
 }
 
-/// A focal length and a baseline are a calibration.
+/// A focal length and a baseline replace a calibration.
 #[test]
-fn numbers_take_the_place_of_a_calibration() {
+fn numbers_replace_a_calibration() {
     let folder = Folder::new();
     let text = "cam0=[215.5 0 119.5; 0 215.5 89.5; 0 0 1]\ndoffs=0\nbaseline=160\n";
     fs::write(folder.join("a.txt"), text).unwrap();
@@ -763,7 +762,7 @@ fn numbers_take_the_place_of_a_calibration() {
     assert!(written("mm", "--focal 215.5 --baseline 160mm") == expected);
     let metres = written("m", "--focal 215.5 --baseline 0.16m");
     assert!(metres[1] == expected[1] && metres[0] != expected[0]);
-    // Control.
+    // Control: another baseline gives other depths.
     assert!(written("other", "--focal 216 --baseline 160mm")[1] != expected[1]);
 
     for (view, from) in [("left", "im0"), ("right", "im1")] {
@@ -776,6 +775,6 @@ fn numbers_take_the_place_of_a_calibration() {
 
     let line = "match left/0.png right/0.png d.pfm --max-disparity 31 --focal 215.5 --baseline 160 --also depth --json -";
     let run = run(&folder, line).succeeded();
-    run.says("unit: that of --baseline");
+    run.says("unit: same as --baseline");
     assert!(run.json()["files"]["calibration"].is_null());
 }

@@ -1,10 +1,10 @@
-//! Calibrations that contradict themselves: the line says which two entries, and by how much.
+//! Self-contradictory calibrations: the error names both entries and the discrepancy.
 
 use super::calibrations::{opencv, rectify, stored, turned, with_numbers};
 use super::*;
 
-/// What is added to or changed in a calibration, and what must be said then. The change is a text and its replacement; of an
-/// entry that begins with it, `NAME * factor` scales all numbers, and `NAME turned degrees` turns a rotation about the y axis.
+/// The file to change, the change, and words of the error. A change is a text and its replacement, or for an entry `NAME * factor`, which
+/// scales all its numbers, or `NAME turned degrees`, which turns a rotation about the y axis.
 const CONTRADICTIONS: &[(&str, &str, &str)] = &[
     ("model", "fisheye: 0\ndistortion_model: equidistant", "distortion_model: contradicts fisheye"),
     ("model", "fisheye: 1\ncamera_model: brown_conrady", "camera_model: contradicts fisheye"),
@@ -46,7 +46,7 @@ const CONTRADICTIONS: &[(&str, &str, &str)] = &[
 ];
 
 #[test]
-fn calibrations_that_contradict_themselves_are_told() {
+fn contradictory_calibrations_are_reported() {
     let folder = Folder::new();
     for (kind, change, words) in CONTRADICTIONS {
         let text = match *kind {
@@ -67,9 +67,9 @@ fn calibrations_that_contradict_themselves_are_told() {
         fs::write(folder.join("a-file"), text).unwrap();
         let told = rectify(&folder, "a-file");
         told.failed(1, &format!("a-file & {words}"));
-        assert_eq!(listing(&folder).len(), 1, "{change}: nothing is left");
+        assert_eq!(listing(&folder).len(), 1, "{change}: no output");
     }
-    // Control: without a change, nothing contradicts.
+    // Control: the unchanged file is consistent.
     fs::write(folder.join("a-file"), stored()).unwrap();
     rectify(&folder, "a-file").succeeded().says("240 x 180, 98.7 % of the left");
 }

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_first_map_is_that_of_the_command_that_it_shows() {
+fn the_demo_gives_the_map_of_the_command_it_prints() {
     let folder = Folder::new();
     let told = run(&folder, "demo").succeeded();
     told.says("320 x 240, 48 labels & points; unit: m");
@@ -26,25 +26,25 @@ fn a_first_map_is_that_of_the_command_that_it_shows() {
             [&folder, &again].map(|folder| fs::read(folder.join("mrfgs-demo").join(name)).unwrap());
         assert!(first == again, "{name}");
     }
-    // Once more, in its place, but not where something else is among it.
+    // A second run replaces the folder, unless it contains other files.
     let before = listing(&folder);
     run(&folder, "demo").succeeded().prints("This was mrfgs match");
     assert!(listing(&folder) == before);
     let mine = folder.join("mrfgs-demo/mine.txt");
     fs::write(&mine, "my own").unwrap();
-    run(&folder, "demo").failed(1, "mrfgs-demo & the folder is not empty; name a new one");
+    run(&folder, "demo").failed(1, "mrfgs-demo & the folder is not empty; give a new one");
     fs::remove_file(mine).unwrap();
     fs::copy(scene("wall/im0.png"), folder.join("mrfgs-demo/left.png")).unwrap();
-    run(&folder, "demo").failed(1, "mrfgs-demo & the folder is not empty; name a new one");
+    run(&folder, "demo").failed(1, "mrfgs-demo & the folder is not empty; give a new one");
 }
 
 #[test]
-fn a_folder_that_holds_something_is_left_alone() {
+fn a_folder_with_other_files_is_left_alone() {
     let folder = Folder::new();
     fs::create_dir(folder.join("mine")).unwrap();
     fs::write(folder.join("mine/left.png"), "my own").unwrap();
-    run(&folder, "demo mine").failed(1, "mine & the folder is not empty; name a new one");
+    run(&folder, "demo mine").failed(1, "mine & the folder is not empty; give a new one");
     assert_eq!(fs::read(folder.join("mine/left.png")).unwrap(), b"my own");
     run(&folder, "demo absent/deep").failed(1, "absent");
-    run(&folder, "").failed(2, "give a subcommand: demo, match & `mrfgs demo` shows");
+    run(&folder, "").failed(2, "give a command: demo, match & try `mrfgs demo`");
 }

@@ -1,4 +1,4 @@
-//! Links of the documents lead to files and headings that are there.
+//! Links in the documents lead to existing files and headings.
 
 use std::fs;
 use std::path::Path;
@@ -17,19 +17,18 @@ const DOCUMENTS: [&str; 11] = [
     "testdata/README.md",
 ];
 
-/// The lines outside blocks of code.
+/// The lines outside code blocks.
 fn prose(text: &str) -> impl Iterator<Item = &str> {
     text.split("\n```").step_by(2).flat_map(str::lines)
 }
 
-/// The name by which links call a heading.
+/// The anchor of a heading.
 fn anchor(heading: &str) -> String {
     let kept = heading.trim().chars().filter(|&c| c.is_alphanumeric() || " -_".contains(c));
     kept.flat_map(char::to_lowercase).map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// The links of a document in the folder `folder` that lead nowhere, and how many it has within the
-/// repository.
+/// The broken links of a document in the folder `folder`, and the number of its links within the repository.
 fn broken(text: &str, folder: &Path) -> (Vec<String>, usize) {
     let links =
         prose(text).flat_map(|line| line.split("](").skip(1)).filter_map(|rest| rest.split(')').next());
@@ -57,7 +56,7 @@ fn links_lead_somewhere() {
         links += count;
     }
     assert!(links > 40, "{links} links");
-    // Control: what leads nowhere is found.
+    // Control: broken links are found.
     let text = "# C and C++\n[a](#c-and-c) [b](#c)\n[c](README.md#test) [d](README.md#tests) [e](none.md)\n\
                 ```\n[f](#f)\n```\n";
     assert_eq!(broken(text, &root), (["#c", "README.md#tests", "none.md"].map(String::from).into(), 5));

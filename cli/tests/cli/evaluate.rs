@@ -7,19 +7,19 @@ use mrfgs::options::Method;
 
 use super::*;
 
-/// Evaluates.
+/// Runs `evaluate` successfully.
 pub(super) fn evaluated(folder: &Path, line: &str) -> Run {
     run(folder, &format!("evaluate {line}")).succeeded()
 }
 
-/// Evaluates and fails: one line with all these words, and the folder stays as it was.
+/// Runs `evaluate` and expects a one-line error with all these words, and no change in the folder.
 pub(super) fn refused(folder: &Path, line: &str, code: i32, words: &str) {
     let before = listing(folder);
     run(folder, &format!("evaluate {line}")).failed(code, words);
     assert!(listing(folder) == before, "{line}");
 }
 
-/// Every number of a report, by its place in the JSON.
+/// Every number of a report, by its path in the JSON.
 fn figures(value: &Value, place: &str, all: &mut BTreeMap<String, f64>) {
     match value {
         Value::Object(entries) => {
@@ -35,7 +35,7 @@ fn figures(value: &Value, place: &str, all: &mut BTreeMap<String, f64>) {
 }
 
 #[test]
-fn evaluate_gives_figures_and_the_same_for_a_written_map() {
+fn evaluate_gives_the_same_figures_for_a_written_map() {
     let folder = Folder::new();
     let told = evaluated(&folder, "@slanted @exposure --json out.json");
     let lines: Vec<&str> = told.stdout.lines().collect();
@@ -74,11 +74,11 @@ fn evaluate_gives_figures_and_the_same_for_a_written_map() {
             assert!((value - expected).abs() <= 1e-6 * expected.abs(), "{place}: {value} and {expected}");
         }
     }
-    // Without the mask there is a table all the same.
+    // Without a mask the table is shorter.
     evaluated(&folder, "map map.pfm --truth @slanted/disp0GT.pfm").prints("map  final |");
 }
 
-/// The truth of `slanted` as 8 bits hold it, unknown in the top left corner: in levels, and in pixels as they read.
+/// The ground truth of `slanted` in 8 bits, unknown in the top left corner: as stored, and as read in pixels.
 fn quantised(scale: f32) -> (GrayImage, Plane<f32>) {
     let truth = read::read_disparity(&scene("slanted/disp0GT.pfm")).unwrap();
     let levels = Plane::from_fn(truth.width(), truth.height(), |x, y| {
@@ -89,7 +89,7 @@ fn quantised(scale: f32) -> (GrayImage, Plane<f32>) {
     (GrayImage::from_fn(w, h, |x, y| Luma([levels[(x as usize, y as usize)]])), pixels)
 }
 
-/// A folder with `slanted` in the layouts of 2003 (`old`) and 2005 (`newer`), and its maps by the program.
+/// A folder with `slanted` in the layouts of 2003 (`old`) and 2005 (`newer`), and its maps.
 fn older_layouts() -> Folder {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
@@ -106,7 +106,7 @@ fn older_layouts() -> Folder {
 }
 
 #[test]
-fn older_layouts_give_the_figures_of_the_same_truth_by_the_other_route() {
+fn older_layouts_give_the_same_figures_as_evaluate_map() {
     let folder = older_layouts();
     let at = |name: &str| folder.join(name);
     let [old, newer] = ["old/im2.png old/im6.png", "newer/view1.png newer/view5.png"];
@@ -126,14 +126,14 @@ fn older_layouts_give_the_figures_of_the_same_truth_by_the_other_route() {
             let expected = evaluated(&folder, &by_pfm).json();
             assert_eq!(evaluated(&folder, &by_png).json(), expected);
             let (found, expected) = (&figures["pairs"][0][map], &expected["pairs"][0]["final"]);
-            assert_eq!(found["all"]["pixels"], 240 * 180 - 40 * 30, "what is unknown stays out");
+            assert_eq!(found["all"]["pixels"], 240 * 180 - 40 * 30, "unknown pixels do not count");
             assert!(found["all"]["avg"].as_f64().unwrap() < 2.0, "{found}");
             assert_eq!(found, expected, "{dir}, {map}");
         }
         assert_eq!(figures["pairs"][0]["name"], dir);
     }
 
-    // Twice the scale is half the disparity, and calib.txt has the last word on the range.
+    // Twice the scale halves the disparities; a calib.txt overrides the range.
     let half = evaluated(&folder, "old --truth-scale 8 --json -").json();
     assert!(half["pairs"][0]["final"]["all"]["avg"].as_f64().unwrap() > 3.0);
     fs::write(at("old/calib.txt"), "ndisp=9\n").unwrap();
@@ -151,21 +151,21 @@ fn scales_and_incomplete_folders_are_refused() {
     }
     copy("slanted", &at("new"));
     Plane::filled(240, 180, 1.0).save(at("map.pfm")).unwrap();
-    refused(&folder, "new --truth-scale 3", 2, "--truth-scale & leave it out");
+    refused(&folder, "new --truth-scale 3", 2, "--truth-scale & remove it");
     let line = "map map.pfm --truth map.pfm --truth-scale 3";
     refused(&folder, line, 1, "map.pfm & whole numbers & remove --scale");
     refused(&folder, "map map.pfm --truth old/disp2.png", 1, "disp2.png & --truth-scale");
     refused(&folder, "map map.pfm --truth old/im2.png --truth-scale 3", 1, "im2.png & more than one channel");
 
     fs::remove_file(at("newer/view5.png")).unwrap();
-    refused(&folder, "old newer", 1, "newer/view5.png & holds view1.png, view5.png, disp1.png");
+    refused(&folder, "old newer", 1, "newer/view5.png & must contain view1.png, view5.png, disp1.png");
     fs::remove_file(at("old/disp2.png")).unwrap();
-    refused(&folder, "old", 1, "old/disp2.png & holds im2.png, im6.png, disp2.png");
+    refused(&folder, "old", 1, "old/disp2.png & must contain im2.png, im6.png, disp2.png");
     fs::create_dir(at("bare")).unwrap();
     refused(&folder, "bare", 1, "bare/im0.png & disp0GT.pfm, calib.txt & view1.png & disp2.png");
 }
 
-/// What JSON holds of each entry of an object, added up.
+/// The sum of a field over all entries of an object.
 fn total(of: &Value, field: &str) -> f64 {
     of.as_object().unwrap().values().map(|entry| entry[field].as_f64().unwrap()).sum()
 }
@@ -193,7 +193,7 @@ fn a_breakdown_adds_up() {
         let [optimal, auc] = ["optimal", "auc"].map(|key| confidence[key].as_f64().unwrap());
         assert!(optimal < auc && auc < bad, "{confidence}");
 
-        // The text has the same.
+        // The text shows the same figures.
         let cells = in_cells(&text);
         let found: Vec<&str> = cells.lines().filter(|line| line.starts_with(&format!("{name} | "))).collect();
         let [errors, worth] = found[..] else { panic!("two lines of {name}:\n{text}") };
@@ -208,17 +208,17 @@ fn a_breakdown_adds_up() {
         assert_eq!(worth, expected);
     }
     assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
-    // Without a mask nothing is known of occlusion; no mean stands for fewer pairs.
+    // Without a mask occlusion is unknown, and no mean covers fewer pairs.
     assert_eq!(thin["breakdown"]["occluded"]["share"], 0.0);
     assert!(thin["validity"].is_null() && figures["mean"]["validity"].is_null());
 
-    // Of the maps that the program writes.
+    // The figures follow from the maps that the program writes.
     run(&folder, "match Teddy/im0.png Teddy/im1.png map.pfm --also confidence,validity").succeeded();
     let truth = read::read_disparity(&at("Teddy/disp0GT.pfm")).unwrap();
     let (map, grey) = (read::read_disparity(&at("map.pfm")).unwrap(), |file: &str| read::grey8(&at(file)));
     let ground = GroundTruth::new(truth.clone(), None).unwrap();
     let expected = ground.sparsify(&map, &grey("map.confidence.png").unwrap()).unwrap();
-    // JSON is read to the last bit but one.
+    // Reading JSON may change the last bit.
     let near = |value: &Value, expected: f64| {
         let value = value.as_f64().unwrap();
         assert!((value - expected).abs() <= 1e-12 * expected, "{value} against {expected}");
@@ -234,7 +234,7 @@ fn a_breakdown_adds_up() {
     near(&teddy["validity"]["precision"], 100.0 * hits / (hits + alarms));
     near(&teddy["validity"]["recall"], 100.0 * hits / (hits + missed));
 
-    // The figures are there without the flag, the tables are not; a map that others made has neither.
+    // The figures are in JSON without the flag, the tables are not printed; a finished map has neither.
     let plain = evaluated(&folder, "Teddy thin").stdout;
     assert!(text.starts_with(&plain) && text.len() > plain.len());
     assert_eq!(evaluated(&folder, "Teddy thin --json -").json()["mean"], figures["mean"]);
@@ -247,13 +247,13 @@ fn a_breakdown_adds_up() {
 }
 
 #[test]
-fn a_map_of_the_other_sign_is_told() {
+fn a_map_with_the_opposite_sign_is_reported() {
     let folder = Folder::new();
     let line = "match @slanted/im0.png @slanted/im1.png d.pfm --device cpu --quiet";
     run(&folder, &format!("{line} --sign right-minus-left --max-disparity 0 --min-disparity -31"))
         .succeeded();
     let told = evaluated(&folder, "map d.pfm --truth @slanted/disp0GT.pfm");
-    told.says("warning: d.pfm & the other way than & disp0GT.pfm");
+    told.says("warning: d.pfm & disp0GT.pfm & opposite signs");
     run(&folder, &format!("{line} --max-disparity 31")).succeeded();
     let told = evaluated(&folder, "map d.pfm --truth @slanted/disp0GT.pfm");
     assert_eq!(told.stderr, "", "control");

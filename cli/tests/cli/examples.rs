@@ -1,14 +1,14 @@
-//! The examples of the README and the guide: each runs as it stands there and prints what stands below it, or is named here with the
-//! reason why it does not run.
+//! The examples of the README and the guide: each runs as written and prints the lines below it, or is listed here with the reason why it
+//! is not run.
 
 use super::recordings::record_drive;
 use super::*;
 
 const DOCUMENTS: [&str; 2] = ["README.md", "docs/guide.md"];
 
-/// The first lines of what does not run here, and why.
+/// The first lines of examples that are not run, with reasons.
 const NOT_RUN: &[(&str, &str)] = &[
-    // It installs, builds, or serves.
+    // These install, build or serve.
     ("cargo install --locked --path cli", "installs"),
     ("pip install ./python", "installs; scripts/python tries it"),
     ("scripts/c --install ~/.local", "installs; scripts/c tries it"),
@@ -16,51 +16,51 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("scripts/web --serve", "takes Node.js"),
     ("scripts/web", "takes Node.js"),
     ("scripts/web --serve 8000", "takes Node.js"),
-    ("scripts/web --test", "takes Node.js and browsers"),
+    ("scripts/web --test", "needs Node.js and browsers"),
     ("scripts/test", "runs this"),
     ("export PKG_CONFIG_PATH=~/.local/lib/pkgconfig LD_LIBRARY_PATH=~/.local/lib", "scripts/c tries it"),
     ("cc video.c $(pkg-config --cflags --libs mrfgs)", "scripts/c tries it"),
-    // Programs of others.
+    // These need other programs.
     (
         "ffmpeg -i stereo.mkv -pix_fmt yuv444p -f yuv4mpegpipe - | mrfgs sequence - - --method fast --max-disparity 63 | ffplay -",
         "takes ffmpeg",
     ),
     (
         "ffmpeg -i /dev/video0 -pix_fmt yuv444p -f yuv4mpegpipe - | mrfgs sequence - - --method fast --max-disparity 63 | ffplay -",
-        "takes ffmpeg and a camera",
+        "needs ffmpeg and a camera",
     ),
     (
         "ffmpeg -i stereo.mkv -f rawvideo -pix_fmt gray16le - | mrfgs sequence - maps --raw-frames 1280x480,gray16le --max-disparity 63",
         "takes ffmpeg",
     ),
-    ("mrfgs sequence left right - --max-disparity 63 | ffmpeg -i - disparity.gif", "takes ffmpeg"),
-    ("mrfgs sequence left.mp4 right.mp4 disparity.mp4 --method fast", "takes ffmpeg"),
-    ("parallel mrfgs batch pairs.csv maps --threads 2 --shard {}/8 ::: $(seq 8)", "takes GNU parallel"),
+    ("mrfgs sequence left right - --max-disparity 63 | ffmpeg -i - disparity.gif", "needs ffmpeg"),
+    ("mrfgs sequence left.mp4 right.mp4 disparity.mp4 --method fast", "needs ffmpeg"),
+    ("parallel mrfgs batch pairs.csv maps --threads 2 --shard {}/8 ::: $(seq 8)", "needs GNU parallel"),
     (
         "sbatch --array=1-8 --wrap 'mrfgs batch pairs.csv maps --shard $SLURM_ARRAY_TASK_ID/8'",
-        "takes Slurm; scripts/slurm tries it",
+        "needs Slurm; scripts/slurm tries it",
     ),
     (
         "parallel_stereo --alignment-method local_epipolar --stereo-algorithm \"mrfgs --threads 2 --memory 2GiB\" left.tif right.tif ...",
         "takes the Ames Stereo Pipeline",
     ),
-    // Machines of others, and what does not end.
+    // These need other machines, or do not end.
     (
         "mrfgs ros --method fast --also points --remap left/image_raw:=/cam0/image_raw --remap right/image_raw:=/cam1/image_raw",
-        "takes cameras; scripts/node tries it",
+        "needs cameras; scripts/node tries it",
     ),
-    ("mrfgs ros --method fast --max-disparity 63", "takes cameras; scripts/node tries it"),
+    ("mrfgs ros --method fast --max-disparity 63", "needs cameras; scripts/node tries it"),
     (
         "mrfgs ros --method fast --also depth,points --remap left/image_raw:=/camera/infra1/image_rect_raw --remap right/image_raw:=/camera/infra2/image_rect_raw",
-        "takes cameras; scripts/node tries it",
+        "needs cameras; scripts/node tries it",
     ),
     ("mrfgs sequence drive.mcap ws://localhost:8765 --also depth,points", "waits for a viewer"),
-    ("mrfgs devices", "tells of the machine"),
-    ("mrfgs match left.png right.png d.pfm --device gpu", "takes a GPU"),
-    ("mrfgs match left.png right.png d.pfm --device 0", "takes a device"),
+    ("mrfgs devices", "depends on the machine"),
+    ("mrfgs match left.png right.png d.pfm --device gpu", "needs a GPU"),
+    ("mrfgs match left.png right.png d.pfm --device 0", "needs a device"),
     ("mrfgs bench --device cpu --method default --repeats 3", "measures"),
-    ("mrfgs bench --large --method default", "measures for long"),
-    ("mrfgs bench path/to/Teddy --device cpu --device gpu --repeats 20 --json bench.json", "takes a GPU"),
+    ("mrfgs bench --large --method default", "takes long"),
+    ("mrfgs bench path/to/Teddy --device cpu --device gpu --repeats 20 --json bench.json", "needs a GPU"),
     // Other languages.
     ("use mrfgs::{Matcher, Pair};", "Rust"),
     ("use mrfgs::{Matcher, Method, Pair};", "Rust"),
@@ -82,7 +82,7 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("import { createMatcher } from '@mrfgs/wasm';", "JavaScript"),
 ];
 
-/// The exit status of those that show a failure.
+/// The exit status of examples that show a failure.
 const FAILURES: [(&str, i32); 4] = [
     ("mrfgs match testdata/mixed/im0.png testdata/mixed/im2.png disparity.pfm", 1),
     ("mrfgs match testdata/mixed/im0.png testdata/mixed/im1.png d.pfm --memory 1MiB", 2),
@@ -90,16 +90,16 @@ const FAILURES: [(&str, i32); 4] = [
     ("mrfgs batch pairs.csv maps --also confidence --status", 1),
 ];
 
-/// Those that print nothing but times.
+/// Examples that print only times.
 const MEASURES: [&str; 1] = ["mrfgs inspect testdata/mixed/im0.png testdata/mixed/im1.png"];
 
-/// A command, or a block in another language than that of the shell.
+/// A command, or a block in another language than the shell's.
 #[derive(Debug)]
 struct Example {
     language: String,
-    /// A command in one line without its comment, or all lines.
+    /// A command in one line without its comment, or all lines of the block.
     code: String,
-    /// What stands below it as printed.
+    /// The output shown below it.
     printed: String,
 }
 
@@ -125,7 +125,7 @@ fn blocks(text: &str) -> Vec<Vec<Example>> {
                     match (line.strip_prefix("$ "), block.last_mut()) {
                         (Some(code), _) => block.push(example(code)),
                         (None, Some(last)) => last.printed += &[line, "\n"].concat(),
-                        (None, None) => panic!("printed by nothing: {line}"),
+                        (None, None) => panic!("output without a command: {line}"),
                     }
                 }
             }
@@ -141,10 +141,10 @@ fn blocks(text: &str) -> Vec<Vec<Example>> {
                 }
                 assert_eq!(code, "", "the line goes on");
             }
-            // What the example before it prints.
+            // The output of the previous example.
             "text" => {
                 let before =
-                    all.last_mut().and_then(|block| block.last_mut()).expect("an example is before it");
+                    all.last_mut().and_then(|block| block.last_mut()).expect("output follows an example");
                 before.printed = body.to_owned() + "\n";
                 continue;
             }
@@ -155,7 +155,7 @@ fn blocks(text: &str) -> Vec<Vec<Example>> {
     all
 }
 
-/// What examples find in their folder.
+/// A folder with the files that examples need.
 fn workshop() -> Folder {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
@@ -193,8 +193,7 @@ fn workshop() -> Folder {
     folder
 }
 
-/// A line that does not depend on the machine: without times and numbers of threads, and with one space between its words. Of what
-/// `measures`, no number stays.
+/// A line without times, thread counts and repeated spaces, which depend on the machine; with `measures`, without any numbers.
 fn plain(line: &str, measures: bool) -> String {
     let words: Vec<&str> = line.split_whitespace().collect();
     let next = |i: usize| words.get(i + 1).copied().unwrap_or_default();
@@ -211,7 +210,7 @@ fn plain(line: &str, measures: bool) -> String {
     shown.collect::<Vec<_>>().join(" ")
 }
 
-/// Whether `printed` is what a document says; a line `...` there stands for any lines.
+/// Whether `printed` matches the document's lines; a line `...` there matches any lines.
 fn agrees(said: &[String], printed: &[String]) -> bool {
     match said.split_first() {
         None => printed.is_empty(),
@@ -220,10 +219,10 @@ fn agrees(said: &[String], printed: &[String]) -> bool {
     }
 }
 
-/// Runs an example; what is wrong with it.
+/// Runs an example and returns what is wrong with it.
 fn fault(folder: &Path, example: &Example) -> Option<String> {
     if let Some(file) = example.code.strip_prefix("cat ") {
-        // A file that the reader writes.
+        // A file that the reader is to write.
         fs::write(folder.join(file), &example.printed).unwrap();
         return None;
     }
@@ -255,7 +254,7 @@ fn fault(folder: &Path, example: &Example) -> Option<String> {
 }
 
 #[test]
-fn every_example_prints_what_it_says() {
+fn every_example_prints_what_is_shown() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let (mut ran, mut named, mut faults) = (0, Vec::new(), Vec::new());
     for document in DOCUMENTS {
@@ -272,7 +271,7 @@ fn every_example_prints_what_it_says() {
                     ran += 1;
                     faults.extend(fault(&folder, &example).map(|fault| format!("{document}: {fault}")));
                 } else {
-                    faults.push(format!("{document}: neither run nor named: {}", example.first_line()));
+                    faults.push(format!("{document}: neither run nor listed: {}", example.first_line()));
                 }
             }
         }
@@ -280,10 +279,10 @@ fn every_example_prints_what_it_says() {
     assert!(faults.is_empty(), "{}", faults.join("\n\n"));
     assert!(ran > 40, "{ran} examples");
     let gone: Vec<_> = NOT_RUN.iter().filter(|row| !named.contains(&row.0)).collect();
-    assert!(gone.is_empty(), "no example any more: {gone:?}");
+    assert!(gone.is_empty(), "listed but gone: {gone:?}");
 }
 
-/// Control: what an example does not print, and what nobody has named, is found.
+/// Control: wrong output and unlisted examples are found.
 #[test]
 fn stale_examples_are_found() {
     let folder = Folder::new();

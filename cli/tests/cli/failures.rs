@@ -1,22 +1,22 @@
-//! What goes wrong: one line that says so, and nothing left behind.
+//! Failures: each prints one line and leaves nothing behind.
 
 use super::*;
 
-/// Arguments; exit status; what the message must say: the thing & the remedy.
+/// Arguments, exit status, and words that the message must contain, joined by ` & `.
 type Failure = (&'static str, i32, &'static str);
 
 const TOO_MANY: &str = "240 x 180 & at most 43199 & raise --max-pixels";
 
-/// `M` stands for a `match` that would succeed, up to its output, `I` for such an `inspect`, `P` for a `match` to out.pfm up to its
-/// range, and `R` for one of raw images.
+/// `M` stands for a `match` that would succeed, up to its output; `I` for such an `inspect`; `P` for a `match` to out.pfm up to its range;
+/// `R` for a `match` of raw images.
 const FAILURES: &[Failure] = &[
-    // The command line itself.
-    ("", 2, "subcommand & match, rectify, depth, sequence, ros, batch & --help"),
+    // The command line.
+    ("", 2, "command & match, rectify, depth, sequence, ros, batch & --help"),
     ("frobnicate", 2, "frobnicate & --help"),
     ("match left.png", 2, "RIGHT & missing & left.png holds one view"),
     ("completions", 2, "<SHELL> & mrfgs completions --help"),
     ("completions tcsh", 2, "tcsh & bash & zsh"),
-    ("man none/man1", 1, "none/man1 & no folder & create that first"),
+    ("man none/man1", 1, "none/man1 & parent folder does not exist & create that first"),
     ("man left.png", 1, "left.png"),
     ("M out.pfm --frobnicate", 2, "--frobnicate & --help"),
     ("M out.pfm --mask", 2, "--mask & value"),
@@ -71,26 +71,26 @@ const FAILURES: &[Failure] = &[
     ("M none/out.pfm --also preview", 1, "none/out.pfm & create it"),
     ("M out.png --min-disparity -1", 2, "out.png & -1 to 9 & .pfm or .tif"),
     ("match left.png right.png out.png --max-disparity 256", 2, "out.png & 0 to 256 & .pfm or .tif"),
-    ("M out.pfm --json out.pfm", 2, "--json & out.pfm is OUTPUT already & another name"),
+    ("M out.pfm --json out.pfm", 2, "--json & out.pfm is already OUTPUT & another name"),
     ("M out.pfm --json ./folder/../out.pfm", 2, "--json & OUTPUT & another name"),
     (
         "M out.pfm --also raw,validity --json ./out.validity.png",
         2,
-        "--json & out.validity.png is --also validity already & another name",
+        "--json & out.validity.png is already --also validity & another name",
     ),
-    ("M left.png", 2, "OUTPUT & left.png is LEFT already & another name"),
-    ("M folder/../right.png", 2, "OUTPUT & is RIGHT already & another name"),
+    ("M left.png", 2, "OUTPUT & left.png is already LEFT & another name"),
+    ("M folder/../right.png", 2, "OUTPUT & is already RIGHT & another name"),
     (
         "match left.png view.preview.png folder/../view.pfm --max-disparity 9 --also preview",
         2,
-        "--also preview & view.preview.png is RIGHT already & another name",
+        "--also preview & view.preview.png is already RIGHT & another name",
     ),
     ("M narrow.png --mask left.png --json left.png", 2, "--json & LEFT & another name"),
     ("M out.pfm --json none/a.json", 1, "none/a.json & create it"),
     ("M out.pfm --json folder", 1, "folder & is a folder"),
-    ("M out.pfm --json right.png", 2, "--json & right.png is RIGHT & another name"),
-    ("M - --json -", 2, "--json & - is OUTPUT already & another name"),
-    ("M - --also raw", 2, "--also raw & beside OUTPUT & give OUTPUT a name"),
+    ("M out.pfm --json right.png", 2, "--json & right.png is already RIGHT & another name"),
+    ("M - --json -", 2, "--json & - is already OUTPUT & another name"),
+    ("M - --also raw", 2, "--also raw & beside OUTPUT & give a file as OUTPUT"),
     ("M out.pfm --colours grey", 2, "--colours & add --also preview"),
     ("M out.pfm --also validity --colours grey", 2, "--colours & add --also preview"),
     ("M out.pfm --also preview --colours jet", 2, "--colours & 'jet' & turbo, viridis, grey"),
@@ -131,9 +131,9 @@ const FAILURES: &[Failure] = &[
     ("I folder/full", 1, "folder/full & not empty"),
     ("I left.png", 1, "left.png & is a file"),
     ("I none/steps", 1, "none/steps & no folder none & create it"),
-    ("I steps --json steps", 2, "--json & steps is DIR already & another name"),
-    ("I taken.pfm --json taken.pfm/a.json", 2, "--json & folder of DIR & another name"),
-    ("I steps --json left.png", 2, "--json & left.png is LEFT already & another name"),
+    ("I steps --json steps", 2, "--json & steps is already DIR & another name"),
+    ("I taken.pfm --json taken.pfm/a.json", 2, "--json & folder of DIR & another path"),
+    ("I steps --json left.png", 2, "--json & left.png is already LEFT & another name"),
     ("I steps --quiet", 2, "--quiet & mrfgs inspect --help"),
     ("match damaged/left.png right.png out.pfm", 1, "calib.txt & line 1 & ndisp"),
     ("match huge/left.png right.png out.pfm", 1, "calib.txt & ndisp=100000 & at most 16384"),
@@ -152,7 +152,7 @@ const FAILURES: &[Failure] = &[
     ("M out.pfm --method best", 2, "--method & `best` & default, accurate, fast & paper, fgs & TOML file"),
     ("M out.pfm --method none/best.toml", 1, "none/best.toml & no such file"),
     ("M out.pfm --method value.toml --method paper", 1, "value.toml & line 3"),
-    ("M out.pfm --method default --method paper", 2, "--method & paper would replace & give it first"),
+    ("M out.pfm --method default --method paper", 2, "--method & paper would override & put it first"),
     ("M out.pfm --set colour=red", 2, "--set colour & no such key & mrfgs presets"),
     ("M out.pfm --set levels", 2, "--set & levels=4"),
     ("M out.pfm --set =4", 2, "--set & levels=4"),
@@ -172,7 +172,7 @@ const FAILURES: &[Failure] = &[
     // Raw images.
     ("R --rectify --also preview,depth", 2, "--also depth & no scale & --calib"),
     ("R --rectify --also points-original.las", 2, "--also points-original.las & no scale & --calib"),
-    ("R --rectify --calib @raw/cameras.yml --orient", 2, "--orient & as they are stored & leave"),
+    ("R --rectify --calib @raw/cameras.yml --orient", 2, "--orient & as stored & remove"),
     (
         "match flat.png flat.png out.pfm --rectify",
         1,
@@ -183,9 +183,9 @@ const FAILURES: &[Failure] = &[
     (
         "R --calib @raw/cameras.yml --also points-original.las",
         2,
-        "--also points-original.las & add --rectify & take --also points",
+        "--also points-original.las & add --rectify & use --also points",
     ),
-    ("batch list.csv maps --also points-original", 2, "--also points-original: & take --also points"),
+    ("batch list.csv maps --also points-original", 2, "--also points-original: & use --also points"),
     ("R --calib @raw/cameras.yml --also depth", 1, "not rectified & --rectify"),
     (
         "R --rectify --calib no-unit.yml --max-disparity 40 --also depth-mm",
@@ -214,7 +214,7 @@ const FAILURES: &[Failure] = &[
     ("rectify @raw/left.png @wall/im1.png out", 1, "wall/im1.png & agree on how the camera moved & --calib"),
     ("rectify @raw/left.png @raw/left.png out", 1, "left.png & no depth & step to the side"),
     ("rectify @raw/left.png @raw/right.png out --alpha 2", 2, "--alpha & from 0 to 1"),
-    ("rectify @raw/left.png @raw/right.png out --calib @raw/cameras.yml --orient", 2, "--orient & leave"),
+    ("rectify @raw/left.png @raw/right.png out --calib @raw/cameras.yml --orient", 2, "--orient & remove"),
     ("rectify @raw/left.png @raw/right.png @raw/left.png --calib @raw/cameras.yml", 1, "is a file"),
     // Clouds.
     ("M out.pfm --also points.xyz", 2, "--also & points.xyz & points"),
@@ -240,11 +240,15 @@ const FAILURES: &[Failure] = &[
     // Evaluation.
     ("evaluate", 2, "DIR & mrfgs evaluate --help"),
     ("evaluate none", 1, "none/im0.png & disp0GT.pfm, calib.txt"),
-    ("evaluate left.png", 1, "left.png/im0.png & a folder to evaluate holds"),
-    ("evaluate without-im0.png", 1, "without-im0.png/im0.png & a folder to evaluate holds"),
-    ("evaluate without-im1.png", 1, "without-im1.png/im1.png & a folder to evaluate holds"),
-    ("evaluate without-disp0GT.pfm", 1, "without-disp0GT.pfm/disp0GT.pfm & a folder to evaluate holds"),
-    ("evaluate without-calib.txt", 1, "without-calib.txt/calib.txt & a folder to evaluate holds"),
+    ("evaluate left.png", 1, "left.png/im0.png & a folder to evaluate must contain"),
+    ("evaluate without-im0.png", 1, "without-im0.png/im0.png & a folder to evaluate must contain"),
+    ("evaluate without-im1.png", 1, "without-im1.png/im1.png & a folder to evaluate must contain"),
+    (
+        "evaluate without-disp0GT.pfm",
+        1,
+        "without-disp0GT.pfm/disp0GT.pfm & a folder to evaluate must contain",
+    ),
+    ("evaluate without-calib.txt", 1, "without-calib.txt/calib.txt & a folder to evaluate must contain"),
     ("evaluate misfit without-calib.txt", 1, "without-calib.txt/calib.txt"),
     ("evaluate misfit", 1, "disp0GT.pfm is 240 x 180 & im0.png is 60 x 40"),
     ("evaluate misfit --method best", 2, "--method & default, accurate, fast"),
@@ -261,7 +265,7 @@ const FAILURES: &[Failure] = &[
     (
         "evaluate submission taken.png X misfit --json taken.png/a.json",
         2,
-        "--json & folder of DIR & another name",
+        "--json & folder of DIR & another path",
     ),
     ("evaluate map unknown.pfm", 2, "--truth & mrfgs evaluate map --help"),
     ("evaluate map --truth unknown.pfm", 2, "<MAP> & mrfgs evaluate map --help"),
@@ -288,8 +292,8 @@ const FAILURES: &[Failure] = &[
     ("batch", 2, "<LIST> <OUTDIR> & mrfgs batch --help"),
     ("batch none.csv out", 1, "none.csv & no such file & check the name"),
     ("batch left.png out", 1, "left.png & UTF-8 & CSV"),
-    ("batch empty.png out", 1, "empty.png & lists no pair & CSV"),
-    ("batch folder/full out", 1, "folder/full & lists no pair"),
+    ("batch empty.png out", 1, "empty.png & contains no pairs & CSV"),
+    ("batch folder/full out", 1, "folder/full & contains no pairs"),
     ("batch pairs.csv none/out", 1, "none/out & there is no folder none & create it"),
     ("batch pairs.csv left.png", 1, "left.png & is a file & folder"),
     ("batch pairs.csv .", 2, "./left.png & is an input & another folder"),
@@ -308,10 +312,10 @@ const FAILURES: &[Failure] = &[
     ),
     ("batch pairs.csv out --colours grey", 2, "--colours & add --also preview"),
     // Benches.
-    ("bench none", 1, "none/im0.png & a folder to match holds im0.png, im1.png, calib.txt; or"),
-    ("bench left.png", 1, "left.png/im0.png & a folder to match holds"),
-    ("bench misfit without-im1.png", 1, "without-im1.png/im1.png & a folder to match holds im0.png"),
-    ("bench misfit without-calib.txt", 1, "without-calib.txt/calib.txt & a folder to match holds"),
+    ("bench none", 1, "none/im0.png & a folder to match must contain im0.png, im1.png, calib.txt; or"),
+    ("bench left.png", 1, "left.png/im0.png & a folder to match must contain"),
+    ("bench misfit without-im1.png", 1, "without-im1.png/im1.png & a folder to match must contain im0.png"),
+    ("bench misfit without-calib.txt", 1, "without-calib.txt/calib.txt & a folder to match must contain"),
     ("bench broken --device cpu", 1, "broken/im1.png & not an image & give PNG"),
     ("bench broken --device cpu --method fgs --json a.json", 1, "broken/im1.png & not an image"),
     ("bench misfit --repeats 0", 2, "--repeats & 1..=1000"),
@@ -349,16 +353,16 @@ fn every_failure_is_one_line_and_leaves_nothing() {
         }
         told.failed(*code, words);
         let said = &told.stderr;
-        assert!(!said.contains("{ ") && !said.contains("Some("), "Rust's own words: {said}");
+        assert!(!said.contains("{ ") && !said.contains("Some("), "Rust's debug format: {said}");
         assert!(listing(&folder) == before, "{line}: the folder has changed");
     }
     assert!(other.is_empty(), "another exit status: {other:#?}");
 }
 
-/// Names that no file can have are refused before anything runs: a match would say so in a line of its own.
+/// Invalid file names are refused before anything runs: a match would print its summary first.
 #[cfg(target_os = "linux")]
 #[test]
-fn names_that_cannot_be_are_refused_at_once() {
+fn invalid_names_are_refused_at_once() {
     let folder = workshop();
     let before = listing(&folder);
     let (long, nearly) = ("n".repeat(252), "n".repeat(251));
@@ -421,7 +425,7 @@ fn what_was_written_before_a_failure_is_removed() {
     for end in
         ["raw.pfm", "depth.pfm", "points.ply", "validity.png", "preview.png", "side-by-side.png", "json"]
     {
-        // The disk that is always full lets itself be opened.
+        // The device that is always full can be opened.
         let name = format!("out.{end}");
         let link = folder.join(&name);
         std::os::unix::fs::symlink("/dev/full", &link).unwrap();

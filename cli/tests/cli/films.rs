@@ -1,9 +1,9 @@
-//! Films that ffmpeg decodes and encodes for `mrfgs sequence`. A script takes its place, so that every machine runs these tests: it
-//! takes a film for YUV4MPEG2 after the bytes that say its container.
+//! Films that ffmpeg decodes and encodes for `mrfgs sequence`. A script replaces ffmpeg, so the tests run everywhere: a film is YUV4MPEG2
+//! after the bytes that identify its container.
 
 use super::*;
 
-/// Says what ffmpeg was asked, and does it where the film is named `whole`; a film named `torn` fails on the way.
+/// Records the arguments, and copies films named `whole`; a film named `torn` fails midway.
 const FFMPEG: &str = r#"#!/bin/sh
 echo "$@" >> asked
 for last; do :; done
@@ -18,7 +18,7 @@ esac
 
 const RANGE: &str = "--max-disparity 23 --device cpu";
 
-/// A folder with a film of two frames as YUV4MPEG2 and as a film, and the folder of a program ffmpeg.
+/// A folder with two frames as YUV4MPEG2 and as a film, and the folder of a program ffmpeg.
 fn films() -> Folder {
     let folder = Folder::new();
     let mut stream = b"YUV4MPEG2 W128 H48 F30:1 Ip A1:1 Cmono\n".to_vec();
@@ -45,7 +45,7 @@ fn films() -> Folder {
     folder
 }
 
-/// What is in the folder, but for what was asked.
+/// The files in the folder, without the record of arguments.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
     let mut files = listing(folder);
     files.remove(&folder.join("asked"));
@@ -58,7 +58,7 @@ fn with_ffmpeg(folder: &Path, line: &str) -> Run {
 }
 
 #[test]
-fn films_are_those_of_the_plain_stream() {
+fn films_give_the_maps_of_the_plain_stream() {
     let folder = films();
     let at = |name: &str| fs::read(folder.join(name)).unwrap();
     run(&folder, &format!("sequence plain.y4m plain --quiet {RANGE}")).succeeded();
@@ -75,25 +75,26 @@ fn films_are_those_of_the_plain_stream() {
     with_ffmpeg(&folder, &format!("sequence plain.y4m film.mp4 --quiet {RANGE}")).succeeded();
     assert!(at("film.mp4") == at("plain-film.y4m"));
     fs::remove_file(folder.join("film.mp4")).unwrap();
-    assert_eq!(files(&folder), before, "nothing else is left");
-    // Every frame counts, and names hold whatever names may hold.
+    assert_eq!(files(&folder), before, "no other files");
+    // No frame is dropped, and paths are passed safely.
     let asked = fs::read_to_string(folder.join("asked")).unwrap();
     assert!(asked.contains("-i file:whole.mp4") && asked.contains("setpts=N/FRAME_RATE/TB"), "{asked}");
     assert!(asked.contains("pad=ceil(iw/2)*2:ceil(ih/2)*2 -pix_fmt yuv420p"), "{asked}");
 }
 
 #[test]
-fn what_ffmpeg_cannot_do_is_said() {
+fn failures_of_ffmpeg_are_reported() {
     let folder = films();
-    // Damage that it makes up for ends nothing.
-    let words = "warning: hurt.mp4: some frames may be wrong, since ffmpeg says: hurt.mp4: error while decoding MB 3 4";
+    // Damage that ffmpeg conceals only causes a warning.
+    let words =
+        "warning: hurt.mp4: some frames may be damaged; ffmpeg says: hurt.mp4: error while decoding MB 3 4";
     with_ffmpeg(&folder, &format!("sequence hurt.mp4 hurt {RANGE}")).succeeded().says(words);
     assert_eq!(listing(&folder.join("hurt")).len(), 2);
     let said = with_ffmpeg(&folder, &format!("sequence whole.mp4 sound {RANGE}")).succeeded().stderr;
     assert!(!said.contains("warning"), "{said}");
     with_ffmpeg(&folder, &format!("sequence torn.mp4 maps --quiet {RANGE}"))
         .failed(1, "torn.mp4 & ffmpeg: torn.mp4: moov atom not found");
-    // The first frame was whole.
+    // The first frame was intact.
     assert_eq!(listing(&folder.join("maps")).len(), 1);
     let before = files(&folder);
     with_ffmpeg(&folder, &format!("sequence whole.mp4 whole.mp4 --quiet {RANGE}"))
@@ -106,7 +107,7 @@ fn what_ffmpeg_cannot_do_is_said() {
             &format!("sequence {line} --quiet {RANGE}"),
             &[("PATH", empty.to_str().unwrap())],
         );
-        said.failed(1, "mp4 & there is none on the PATH & install it & NAME.y4m");
+        said.failed(1, "mp4 & not on the PATH & install it & NAME.y4m");
     }
     fs::remove_dir(&empty).unwrap();
     assert_eq!(files(&folder), before);

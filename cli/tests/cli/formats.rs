@@ -1,10 +1,10 @@
-//! The forms in which programs write calibrations: each one of the same cameras gives the same rectified pair.
+//! Calibrations as written by many programs: all forms of the same cameras give the same rectified pair.
 
 use super::calibrations::alike;
 use super::forms::{Files, Rig, fisheyes, radial, unified};
 use super::*;
 
-/// What a form of `text` changes, and what the refusal must say.
+/// The form, the text and its replacement, and words of the error.
 const WRONG: &[(&str, &str, &str, &str)] = &[
     ("EuRoC", "T_BS", "T_BX", "does not belong to the other files"),
     (
@@ -100,7 +100,7 @@ fn every_form_of_the_same_cameras_gives_the_same_pair() {
     }
 }
 
-/// Models that OpenCV has not, as Kalibr and Basalt write them.
+/// Models that OpenCV lacks, as Kalibr and Basalt write them.
 #[test]
 fn wide_lenses_are_the_same_in_every_form() {
     let rig = Rig::new();
@@ -132,15 +132,15 @@ fn wide_lenses_are_the_same_in_every_form() {
     alike(&folder.join("expected"), &folder.join("out"), "fov");
 }
 
-/// ZED's file has a lens for each size of images; those of the test have another size.
+/// ZED's file has a lens per image size; the images of the test have yet another size.
 #[test]
 fn the_size_of_the_images_chooses_the_lens() {
     let folder = Folder::new();
     let files = Rig::new().zed();
     rectified(&folder, &files, "out").failed(1, "SN1234.conf & is for images of 1280 x 720 & 240 x 180");
-    // They are of images as the cameras took them, whatever their size.
+    // They apply to raw images, whatever their size.
     run(&folder, "match @raw/left.png @raw/right.png d.pfm --calib SN1234.conf")
-        .failed(1, "SN1234.conf & is of images that are not rectified; add --rectify");
+        .failed(1, "SN1234.conf & describes images that are not rectified; add --rectify");
     for (name, (width, height)) in [("hd", (1280, 720)), ("vga", (672, 376))] {
         let picture = image::GrayImage::from_fn(width, height, |x, y| image::Luma([(x * 7 + y * 13) as u8]));
         picture.save(folder.join("view.png")).unwrap();
@@ -163,7 +163,7 @@ fn the_size_of_the_images_chooses_the_lens() {
 }
 
 #[test]
-fn what_is_packed_by_gzip_is_read() {
+fn gzipped_calibrations_are_read() {
     let folder = Folder::new();
     rectified(&folder, &vec![("a.yml", Rig::new().opencv(""))], "expected").succeeded();
     let gzip = Command::new("gzip").arg(folder.join("a.yml")).status().unwrap();
@@ -178,18 +178,18 @@ fn what_is_packed_by_gzip_is_read() {
 }
 
 #[test]
-fn what_is_wrong_in_a_form_is_told() {
+fn faults_in_a_form_are_reported() {
     let folder = Folder::new();
     for (form, from, to, words) in WRONG {
         let (_, mut files) = radial().into_iter().find(|(name, _)| name == form).unwrap();
-        // The last file that has it, once.
+        // Change the last file that contains the text, once.
         let (_, text) = files.iter_mut().rev().find(|(_, text)| text.contains(from)).unwrap();
         *text = text.replacen(from, to, 1);
         rectified(&folder, &files, "out").failed(1, words);
     }
 }
 
-/// Settings of pairs that are rectified already.
+/// Settings of pairs that are already rectified.
 #[test]
 fn settings_of_rectified_pairs_give_depths() {
     let folder = Folder::new();
@@ -208,7 +208,7 @@ fn settings_of_rectified_pairs_give_depths() {
         format!("%YAML:1.0\nCamera.type: \"Rectified\"\n{}{size}Stereo.b: 0.16\n", numbers("Camera1"));
     let two = format!("%YAML:1.0\n{}{size}Camera.bf: 34.48\n", numbers("Camera"));
     assert!(depths(&three) == first && depths(&two) == first);
-    // Its viewer writes numbers as words; 2 and 3 are sizes that the camera has not.
+    // Its viewer writes numbers as strings; 2 and 3 are sizes that the camera does not have.
     let realsense = r#"{"baseline": "-160", "intrinsic_left.x.x": "0.5", "rectified.0.width": "640", "rectified.0.height": "400",
         "rectified.0.fx": "430", "rectified.0.fy": "430", "rectified.0.ppx": "320", "rectified.0.ppy": "240",
         "rectified.1.width": 240, "rectified.1.height": 180, "rectified.1.fx": 215.5, "rectified.1.fy": 215.5,

@@ -1,4 +1,4 @@
-//! The cameras of `testdata/raw` as programs write them: the files of each form.
+//! The cameras of `testdata/raw` in the formats of many programs: the files of each form.
 
 #![allow(clippy::format_push_string, reason = "texts of many lines read best so")]
 
@@ -12,7 +12,7 @@ use super::*;
 /// Name and text of each file.
 pub(super) type Files = Vec<(&'static str, String)>;
 
-/// The cameras of `testdata/raw`, with lenses that a form can have.
+/// The cameras of `testdata/raw`, with lenses that a format can express.
 pub(super) struct Rig {
     /// fx, fy, cx, cy.
     pub(super) k: [[f64; 4]; 2],
@@ -21,7 +21,7 @@ pub(super) struct Rig {
     pub(super) t: [f64; 3],
 }
 
-/// A turn and a place of the left camera in the frame of a body.
+/// Pose of the left camera in the frame of a body.
 const TURN: [f64; 3] = [0.4, -1.1, 0.7];
 const PLACE: [f64; 3] = [0.25, -0.5, 0.125];
 
@@ -39,16 +39,16 @@ impl Rig {
         Self { d: [[0.02, 0.004, -0.001, 0.0005], [-0.01, 0.003, 0.001, 0.0]], ..Self::new() }
     }
 
-    /// For the unified model with an xi of 0.9, which makes images smaller by 1.9.
+    /// For the unified model with xi = 0.9, which makes images smaller by a factor of 1.9.
     pub(super) fn unified() -> Self {
         let rig = Self::new();
         Self { k: rig.k.map(|[fx, fy, cx, cy]| [1.9 * fx, 1.9 * fy, cx, cy]), ..rig }
     }
 
-    /// From each camera to the body, row by row.
+    /// Pose of each camera in the body's frame, as rows.
     fn to_body(&self) -> [(Matrix, [f64; 3]); 2] {
         let left = (rotation(TURN), PLACE);
-        // From the right camera to the left one, then on.
+        // From the right camera to the left one, then to the body.
         let back = transposed(&self.r);
         let place = rotated(&left.0, rotated(&back, self.t).map(|v| -v));
         [left, (product(&left.0, &back), [0, 1, 2].map(|i| place[i] + PLACE[i]))]
@@ -109,7 +109,7 @@ impl Rig {
     fn vins(&self, model: &str, more: &str, names: [&str; 4], coefficients: [&str; 4]) -> Files {
         let mut rig = "%YAML:1.0\n\nnum_of_cam: 2\ncam0_calib: \"cam0.yaml\"\n".to_owned();
         for (i, pose) in self.to_body().iter().enumerate() {
-            // There is no blank before the list.
+            // No space before the list.
             rig += &matrix(&format!("body_T_cam{i}"), 4, &rows(pose).concat()).replace("data: [", "data:[");
         }
         let camera = |i: usize| {
@@ -132,7 +132,7 @@ impl Rig {
         vec![("vins.yaml", rig), ("cam0.yaml", camera(0)), ("cam1.yaml", camera(1))]
     }
 
-    /// In millimetres: the unit is that of the board by which the cameras were calibrated.
+    /// In millimetres, the unit of the calibration board.
     fn camodocal(&self) -> Files {
         let names = ["fx", "fy", "cx", "cy"];
         let mut files = self.vins("PINHOLE", "", names, ["k1", "k2", "p1", "p2"]);
@@ -188,7 +188,7 @@ impl Rig {
         vec![("SN1234.conf", text)]
     }
 
-    /// With the extrinsics in the left camera, or in the right one.
+    /// With the extrinsics in the left or in the right camera.
     fn depthai(&self, kind: u8, of_left: bool) -> Files {
         let back = transposed(&self.r);
         let there = (self.r, self.t.map(|v| 100.0 * v));
@@ -247,7 +247,7 @@ fn quaternion(turn: &Matrix) -> [f64; 4] {
     [(angle / 2.0).cos(), x, y, z]
 }
 
-/// A matrix of 4 x 4.
+/// A 4 x 4 matrix.
 fn rows((turn, place): &(Matrix, [f64; 3])) -> [[f64; 4]; 4] {
     let row = |y: usize| [turn[y][0], turn[y][1], turn[y][2], place[y]];
     [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
@@ -258,7 +258,7 @@ fn matrix(name: &str, rows: usize, numbers: &[f64]) -> String {
     format!("{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: {numbers:?}\n")
 }
 
-/// `text` with its matrices in base64, as OpenCV has them.
+/// `text` with its matrices in base64, as OpenCV writes them.
 fn packed(text: &str) -> String {
     let mut parts = text.split("data: [");
     let mut out = parts.next().unwrap().to_owned();
@@ -275,7 +275,7 @@ fn packed(text: &str) -> String {
     out
 }
 
-/// The same in JSON.
+/// `text` as JSON.
 fn as_json(text: &str) -> String {
     let mut out = serde_json::Map::new();
     for name in ["K1", "D1", "K2", "D2", "R", "T"] {
@@ -295,7 +295,7 @@ fn as_json(text: &str) -> String {
     serde_json::to_string_pretty(&out).unwrap()
 }
 
-/// One of ROS's files of a driver that gives every second pixel of a region, of the rectification in `stored`.
+/// A ROS file of a driver that bins by two within a region, for the rectification in `stored`.
 fn binned(view: usize) -> String {
     let text = stored();
     let of = |name: &str| -> Vec<f64> {
@@ -316,7 +316,7 @@ fn binned(view: usize) -> String {
     )
 }
 
-/// The forms in which lenses have radial and tangential distortion.
+/// The forms with radial and tangential distortion.
 pub(super) fn radial() -> Vec<(&'static str, Files)> {
     let rig = Rig::new();
     let renamed = ["K1", "K2", "D1", "D2"].into_iter().zip([
@@ -346,7 +346,7 @@ pub(super) fn radial() -> Vec<(&'static str, Files)> {
     ]
 }
 
-/// Those of the model of Kannala and Brandt.
+/// The forms with the model of Kannala and Brandt.
 pub(super) fn fisheyes() -> Vec<(&'static str, Files)> {
     let rig = Rig::fisheye();
     vec![
@@ -362,7 +362,7 @@ pub(super) fn fisheyes() -> Vec<(&'static str, Files)> {
     ]
 }
 
-/// Those of the unified model.
+/// The forms with the unified model.
 pub(super) fn unified() -> Vec<(&'static str, Files)> {
     let rig = Rig::unified();
     let mirror = "mirror_parameters:\n   xi: 0.9\n";

@@ -1,4 +1,4 @@
-//! GeoTIFF: every map that is TIFF lies where its view lies.
+//! GeoTIFF: every TIFF map has the georeference of its view.
 
 use std::io::Cursor;
 
@@ -12,7 +12,7 @@ use super::*;
 
 const KEYS: [u16; 8] = [1, 1, 0, 1, 3072, 0, 1, 32_631];
 
-/// Writes a view of a scene as GeoTIFF whose first pixel is this far east.
+/// Writes a view of a scene as GeoTIFF; `east` is the coordinate of its first pixel.
 fn write_view(path: &Path, from: &str, east: f64) {
     let grey = image::open(scene("slanted").join(from)).unwrap().to_luma8();
     let tags = [
@@ -29,12 +29,12 @@ fn write_view(path: &Path, from: &str, east: f64) {
         .unwrap();
 }
 
-/// The rational polynomials of a satellite: 92 numbers, the third and fourth of which are offsets of line and sample.
+/// The rational polynomials of a satellite: 92 numbers, of which the third and fourth are line and sample offsets.
 fn polynomials(first: f64) -> [f64; 92] {
     std::array::from_fn(|i| first + i as f64)
 }
 
-/// How far east a map begins, and that it has all tags.
+/// The easting of a map, after checking that all tags are present.
 fn east(path: &Path) -> f64 {
     let mut map = Decoder::new(Cursor::new(fs::read(path).unwrap())).unwrap();
     assert_eq!(map.get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap(), [0.5, 0.5, 0.0]);
@@ -46,7 +46,7 @@ fn east(path: &Path) -> f64 {
 }
 
 #[test]
-fn maps_lie_where_their_views_lie() {
+fn maps_have_the_georeference_of_their_views() {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
     write_view(&at("left.tif"), "im0.png", 4e5);
@@ -75,9 +75,9 @@ fn maps_lie_where_their_views_lie() {
     assert!((east(&at("tiled.tif")) - 4e5).abs() < 1e-9);
 }
 
-/// A part of a map lies where it lies in the whole map.
+/// A cropped map keeps its georeference.
 #[test]
-fn regions_lie_in_their_place() {
+fn regions_keep_their_georeference() {
     let folder = Folder::new();
     write_view(&folder.join("left.tif"), "im0.png", 4e5);
     write_view(&folder.join("right.tif"), "im1.png", 7e5);
@@ -86,7 +86,7 @@ fn regions_lie_in_their_place() {
     for (name, east) in [("d.tif", 4e5), ("d.right.tif", 7e5)] {
         let mut map = Decoder::new(Cursor::new(fs::read(folder.join(name)).unwrap())).unwrap();
         assert_eq!(map.dimensions().unwrap(), (100, 50));
-        // The pixel (0, 0) of the whole is (-40, -30) of the part.
+        // Pixel (0, 0) of the whole is (-40, -30) of the crop.
         assert_eq!(map.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap(), [-40.0, -30.0, 0.0, east, 5e6, 0.0]);
         let mut expected = polynomials(east);
         expected[2] -= 30.0;

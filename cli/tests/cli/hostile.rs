@@ -1,9 +1,9 @@
-//! Files that claim more than they hold, or more than anyone wants: refused by their headers, before memory is taken.
+//! Files that claim more than they contain, or are too large: refused by their headers, before memory is allocated.
 
 use super::files::{Png, jpeg, tiff};
 use super::*;
 
-/// Small files that claim gigantic or impossible images, each with words of what is said.
+/// Small files that claim gigantic or impossible images, each with words of the error.
 fn hostile() -> Vec<(&'static str, Vec<u8>, &'static str)> {
     const TOO_MANY: &str = "at most 268435456 are read & raise --max-pixels & crop it";
     const DAMAGED: &str = "get the file again";
@@ -49,13 +49,13 @@ fn hostile() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("none.tif", image(0, 1, &strips), "cannot read"),
         ("within.tif", image(16_384, 16_384, &strips), DAMAGED),
         ("strip.tif", image(9, 9, &strips), DAMAGED),
-        // What 256 MiB can hold, if nobody asks where it comes from.
+        // Would fit into 256 MiB if the missing data were not noticed.
         (
             "counts.tif",
             tiff(&[(256, 4, 1, 9), (257, 4, 1, 9), (258, 3, 0x0080_0000, 8), (277, 3, 1, 1)], &[]),
             "claims 8388608 values & get the file again",
         ),
-        // The decoder prints a line of its own for such a text.
+        // The decoder prints its own line for such a text.
         ("text.tif", tiff(&[(256, 2, u32::MAX, 9), (257, 4, 1, 9)], &[]), "claims 4294967295 values"),
         ("strips.tif", image(9, 9, &[(273, 4, u32::MAX, 8), (278, 4, 1, 1), (279, 4, u32::MAX, 8)]), DAMAGED),
         (
@@ -72,7 +72,7 @@ fn hostile() -> Vec<(&'static str, Vec<u8>, &'static str)> {
 }
 
 #[test]
-fn what_a_header_claims_is_refused_everywhere() {
+fn false_claims_of_a_header_are_refused_everywhere() {
     let folder = workshop();
     for (name, bytes, words) in hostile() {
         assert!(bytes.len() < 1000, "{name} is small");
@@ -87,7 +87,7 @@ fn what_a_header_claims_is_refused_everywhere() {
             "evaluate map unknown.pfm --truth unknown.pfm --mask NAME",
         ] {
             let line = line.replace("NAME", name);
-            // A truth of nothing is refused before its mask is read.
+            // An empty ground truth is refused before its mask is read.
             if line.ends_with(&format!("--mask {name}")) && line.starts_with("evaluate") {
                 run(&folder, &line).failed(1, "unknown.pfm & no known disparity");
             } else {
@@ -99,19 +99,19 @@ fn what_a_header_claims_is_refused_everywhere() {
     }
 }
 
-/// An image of as many pixels as the user allows is read; `failures` has those that are refused.
+/// An image of exactly the allowed number of pixels is read; `failures` has larger ones.
 #[test]
 fn the_limit_on_pixels_is_the_users() {
     let folder = workshop();
     run(&folder, "match left.png right.png out.pfm --max-disparity 31 --max-pixels 2400 --quiet").succeeded();
 }
 
-/// No allocation that the address space does not hold can be had, whether it is touched or not.
+/// Limits the address space, so allocations fail even if they are never touched.
 #[cfg(target_os = "linux")]
 mod memory {
     use super::*;
 
-    /// The program and its threads take 100 MiB or so of addresses.
+    /// The program and its threads need about 100 MiB of address space.
     const KIB: u32 = 256 << 10;
 
     fn limited(folder: &Path, line: &str) -> Run {
@@ -119,19 +119,19 @@ mod memory {
     }
 
     #[test]
-    fn what_a_header_claims_takes_no_memory() {
+    fn claims_of_a_header_take_no_memory() {
         let folder = workshop();
         for (name, bytes, _) in hostile() {
             fs::write(folder.join(name), &bytes).unwrap();
-            // What is too large by default, and what is within the limit but not within the file.
+            // Files above the default limit, and files within the limit but larger than their data.
             let told = limited(&folder, &format!("match {name} {name} out.pfm --max-disparity 9"));
             told.failed(1, &format!("mrfgs: cannot read {name}: "));
         }
     }
 
-    /// A profile that unpacks to far more than the pixels take.
+    /// A compressed profile that is far larger than the pixels.
     #[test]
-    fn what_comes_with_a_png_file_takes_no_memory() {
+    fn profiles_of_png_files_take_no_memory() {
         use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
         let folder = workshop();
         let mut bytes = Vec::new();
@@ -142,17 +142,17 @@ mod memory {
         fs::write(folder.join("profile.png"), bytes).unwrap();
         let line = "match profile.png left.png out.pfm --max-disparity 9 --device cpu --threads 1";
         let told = limited(&folder, line);
-        // It may be refused or read without its profile.
+        // It may be refused, or read without its profile.
         assert!(matches!(told.code, Some(0 | 1)), "{told:?}");
     }
 
-    /// Controls: there is enough for what is true, and not for a claim that could be.
+    /// Controls: true claims fit into the limit, plausible false ones do not.
     #[test]
     fn the_limit_holds() {
         let folder = workshop();
         let line = "match left.png right.png out.pfm --max-disparity 9 --device cpu --threads 1";
         limited(&folder, line).succeeded();
-        // Random bytes between header and pixels, so that the claim of 900 million pixels is not absurd.
+        // Filler between header and pixels, so that the claim of 900 million pixels is plausible.
         let filler = vec![b'x'; 100_000];
         let png = Png {
             size: (30_000, 30_000),

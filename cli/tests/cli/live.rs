@@ -1,5 +1,5 @@
-//! `mrfgs ros`: a node that matches what cameras publish. The cameras are here, over the same DDS; `scripts/node` has those of others.
-//! And addresses where viewers connect to a sequence; `scripts/viewer` has viewers of others.
+//! `mrfgs ros` with cameras simulated over the same DDS, and addresses of viewers of a sequence; `scripts/node` and `scripts/viewer` test
+//! with other implementations.
 
 use mrfgs::Matcher;
 use mrfgs::options::Method;
@@ -10,12 +10,12 @@ use mrfgs_ros::messages::{
 
 use super::*;
 
-/// A domain that is hardly anybody else's.
+/// A domain that other programs hardly use.
 fn domain() -> u16 {
     100 + (std::process::id() % 100) as u16
 }
 
-/// A node, which does not outlive its test.
+/// A node, stopped at the end of its test.
 struct Node(Child);
 
 impl Drop for Node {
@@ -30,7 +30,7 @@ impl Node {
         Self(started(Path::new("."), &line))
     }
 
-    /// Stops it; what it said.
+    /// Stops the node and returns its messages.
     fn stop(mut self) -> String {
         send("-INT", &self.0);
         let mut said = String::new();
@@ -40,7 +40,7 @@ impl Node {
     }
 }
 
-/// Two cameras, and a subscriber to disparities and depths.
+/// Two simulated cameras, and a subscriber to disparities and depths.
 struct Peer {
     images: [Publication; 2],
     infos: [Publication; 2],
@@ -68,7 +68,7 @@ impl Peer {
         }
     }
 
-    /// Sends a pair, whose rows have this many bytes.
+    /// Sends a pair whose rows have `step` bytes.
     fn send(&mut self, views: &[image::RgbImage; 2], step: u32) {
         self.sent += 1;
         let header = Header { stamp: Stamp(self.sent * 50_000_000), frame_id: "eye".into() };
@@ -86,7 +86,7 @@ impl Peer {
         }
     }
 
-    /// Sends pairs until a disparity image comes back.
+    /// Sends pairs until a disparity image arrives.
     fn disparity(&mut self, views: &[image::RgbImage; 2]) -> Vec<u8> {
         let start = Instant::now();
         let mut found = None;
@@ -99,7 +99,7 @@ impl Peer {
     }
 }
 
-/// The message of a map, laid out by hand: what the node must send for it.
+/// The expected message for a map, serialized independently.
 fn message(map: &Plane<f32>, header: &Header, delta_d: f32) -> Vec<u8> {
     let (width, height) = map.size();
     let (width, height) = (width as u32, height as u32);
@@ -149,11 +149,11 @@ fn a_node_matches_what_cameras_publish() {
     sigmas.sort_by(f32::total_cmp);
     let typical = sigmas[(sigmas.len() - 1) / 2];
     let mut map = matched.disparity();
-    assert!(found == message(&map, &header, typical), "the bits of the library");
+    assert!(found == message(&map, &header, typical), "same as the library's map");
     map[(7, 7)] = f32::from_bits(map[(7, 7)].to_bits() ^ 1);
     assert!(found != message(&map, &header, typical), "control: one bit shows");
 
-    // The depths of the third camera are those of `match`.
+    // The depths in the third camera equal those of `match`.
     let (mut depths, start) = (None, Instant::now());
     while depths.is_none() {
         assert!(start.elapsed() < Duration::from_secs(60), "no depths came");
@@ -171,12 +171,12 @@ fn a_node_matches_what_cameras_publish() {
     let bytes = |v: &f32| if v.is_finite() { *v } else { f32::NAN }.to_le_bytes();
     let wanted: Vec<u8> = wanted.data().iter().flat_map(bytes).collect();
     assert_eq!((depths.width, depths.height, depths.header.frame_id.as_str()), (120, 80, "eye_2"));
-    assert!(depths.data[..] == wanted[..], "the depths of match");
+    assert!(depths.data[..] == wanted[..], "same as the depths of match");
 
-    // Rows that are too short, then another size: it goes on.
+    // Rows that are too short are skipped, and another image size is accepted.
     for _ in 0..3 {
         peer.send(&views, 7);
-        // Or the next one takes its place.
+        // Otherwise the next pair may replace it.
         std::thread::sleep(Duration::from_millis(200));
     }
     let part = views.each_ref().map(|view| image::imageops::crop_imm(view, 20, 10, 160, 120).to_image());
@@ -184,7 +184,7 @@ fn a_node_matches_what_cameras_publish() {
     let height = loop {
         assert!(start.elapsed() < Duration::from_secs(60), "no disparities of another size");
         let bytes = peer.disparity(&part);
-        // Behind the first bytes and the headers of message and image: a time, and the length and the text of the frame.
+        // Offset of the time after the encapsulation and the headers of message and image, then length and text of the frame name.
         let at = 4 + 2 * (8 + 4 + 4);
         let height = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
         if height != 180 {
@@ -237,18 +237,18 @@ fn topics_of_another_type_are_named() {
 }
 
 #[test]
-fn flags_of_a_node_that_make_no_sense() {
+fn invalid_flags_of_a_node_are_refused() {
     let folder = Folder::new();
     for (line, words) in [
         ("--remap left/image_raw", "--remap & FROM:=TO"),
-        ("--remap left/image_raw:=/a//b", "--remap & /a//b & no name of ROS"),
-        ("--remap left/image_raw:=right/image_raw", "--remap & /right/image_raw & a topic of its own"),
-        ("--remap __node:=1", "--remap & no name of a node"),
+        ("--remap left/image_raw:=/a//b", "--remap & /a//b & not a valid ROS name"),
+        ("--remap left/image_raw:=right/image_raw", "--remap & /right/image_raw & its own topic"),
+        ("--remap __node:=1", "--remap & not a valid node name"),
         ("--domain 233", "--domain & 233"),
         ("--tolerance -1", "--tolerance & from 0 to 3600"),
-        ("--also preview", "--also preview & no message of ROS"),
+        ("--also preview", "--also preview & cannot be sent as a ROS message"),
         ("--also depth-registered", "--also depth-registered & --into"),
-        ("--also points.pcd", "--also points.pcd & no message of ROS"),
+        ("--also points.pcd", "--also points.pcd & cannot be sent as a ROS message"),
         (
             "--alpha 0.5 -r left/image_raw:=left/image_rect -r right/image_raw:=right/image_rect",
             "--alpha & rectification",
@@ -266,7 +266,7 @@ fn flags_of_a_node_that_make_no_sense() {
 }
 
 #[test]
-fn a_sequence_shows_itself_to_viewers() {
+fn a_sequence_can_be_viewed_live() {
     let folder = Folder::new();
     for (view, name) in [("left", "im0.png"), ("right", "im1.png")] {
         fs::create_dir(folder.join(view)).unwrap();
@@ -279,7 +279,7 @@ fn a_sequence_shows_itself_to_viewers() {
     shown.says("1 frame of 240 x 180");
     for (rest, code, words) in [
         ("ws://127.0.0.1:0 --format tif", 2, "--format & OUTPUT is a viewer"),
-        ("ws://127.0.0.1:0 --also preview", 2, "--also preview & no message of ROS"),
+        ("ws://127.0.0.1:0 --also preview", 2, "--also preview & cannot be sent as a ROS message"),
         ("ws://127.0.0.1:0 --also depth", 2, "--also depth & calib"),
         ("ws://", 1, "cannot write ws://"),
         ("ws://127.0.0.1", 1, "cannot write ws://127.0.0.1"),

@@ -1,6 +1,6 @@
-//! The command line, through the built program: what it writes, and how it fails.
+//! The command line of the built program: outputs and failures.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests are tests too")]
+#![allow(clippy::unwrap_used, reason = "test helpers")]
 
 mod batch;
 mod bench;
@@ -56,7 +56,7 @@ use mrfgs::options::{self, Takes};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// A folder that goes with its test.
+/// A temporary folder, removed after its test.
 struct Folder(TempDir);
 
 impl Folder {
@@ -73,17 +73,17 @@ impl Deref for Folder {
     }
 }
 
-/// What a run of the program leaves.
+/// The result of a run of the program.
 #[derive(Debug)]
 struct Run {
-    /// What was run.
+    /// The command line.
     line: String,
     code: Option<i32>,
     stdout: String,
     stderr: String,
 }
 
-/// The words of a command line; one like `@wall/im0.png` is the path of that file of the scenes.
+/// The words of a command line; `@wall/im0.png` becomes the path of that file in the scenes.
 fn words(line: &str) -> impl Iterator<Item = OsString> {
     line.split_whitespace().map(|word| match word.strip_prefix('@') {
         Some(file) => scene(file).into(),
@@ -91,20 +91,20 @@ fn words(line: &str) -> impl Iterator<Item = OsString> {
     })
 }
 
-/// The program in `folder`.
+/// The program, to be run in `folder`.
 fn program(folder: &Path, line: &str) -> Command {
     let mut program = Command::new(env!("CARGO_BIN_EXE_mrfgs"));
     program.current_dir(folder).args(words(line));
-    // As on a machine without a display, where the Vulkan loader would complain on standard error.
+    // As on a machine without a display, where the Vulkan loader would print to standard error.
     program.env_remove("XDG_RUNTIME_DIR").env_remove("RUST_BACKTRACE");
     program
 }
 
-/// The program at work in `folder`, with pipes to all its ends.
+/// Starts the program in `folder` with pipes for its streams.
 fn started(folder: &Path, line: &str) -> Child {
     let mut program = program(folder, line);
     if cfg!(target_os = "linux") {
-        // Whoever runs the tests may keep signals from them.
+        // The test runner may ignore signals; restore the defaults.
         let mut listening = Command::new("env");
         listening.arg("--default-signal").arg(program.get_program()).args(program.get_args());
         listening.current_dir(folder).env_remove("XDG_RUNTIME_DIR").env_remove("RUST_BACKTRACE");
@@ -122,7 +122,7 @@ fn run_with(folder: &Path, line: &str, environment: &[(&str, &str)]) -> Run {
     Run::of(line, program(folder, line).envs(environment.iter().copied()).output().unwrap())
 }
 
-/// Runs the program after a command of the shell.
+/// Runs the program after a shell command.
 fn shell(folder: &Path, before: &str, line: &str) -> Run {
     let mut shell = Command::new("sh");
     shell.args(["-c", &format!("{before} && exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_mrfgs")]);
@@ -141,7 +141,7 @@ impl Run {
         self
     }
 
-    /// Exactly one line on standard error, with all these words, and nothing on standard output.
+    /// Expects exactly one line on standard error, with all these words, and an empty standard output.
     fn failed(&self, code: i32, words: &str) {
         assert_eq!(self.code, Some(code), "{self:?}");
         assert_eq!(self.stdout, "", "{self:?}");
@@ -151,19 +151,19 @@ impl Run {
         self.says(words);
     }
 
-    /// All these words are on standard error; ` & ` is between them.
+    /// Expects all these words, joined by ` & `, on standard error.
     fn says(&self, words: &str) {
         for word in words.split(" & ") {
             assert!(self.stderr.contains(word), "{}: no `{word}` in: {}", self.line, self.stderr);
         }
     }
 
-    /// These words are not on standard error.
+    /// Expects that these words are not on standard error.
     fn is_silent_on(&self, words: &str) {
         assert!(!self.stderr.contains(words), "{}: `{words}` in: {}", self.line, self.stderr);
     }
 
-    /// The same of standard output.
+    /// Expects all these words, joined by ` & `, on standard output.
     fn prints(&self, words: &str) {
         for word in words.split(" & ") {
             assert!(self.stdout.contains(word), "{}: no `{word}` in:\n{}", self.line, self.stdout);
@@ -175,7 +175,7 @@ impl Run {
     }
 }
 
-/// Waits until something is so.
+/// Waits until a condition holds.
 fn wait_until(what: &str, is_so: impl Fn() -> bool) {
     let start = Instant::now();
     while !is_so() {
@@ -190,18 +190,18 @@ fn send(signal: &str, child: &Child) {
     assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
 }
 
-/// A folder, as `folder` has it, that nobody may write to.
+/// A folder, relative to `folder`, that is not writable.
 #[cfg(target_os = "linux")]
 fn locked(folder: &Path) -> &'static str {
     use std::os::unix::fs::PermissionsExt;
     let locked = folder.join("locked");
     fs::create_dir(&locked).unwrap();
     fs::set_permissions(&locked, fs::Permissions::from_mode(0o555)).unwrap();
-    // Root may write anywhere but where the kernel says no.
+    // Root may write anywhere except where the kernel forbids it.
     if fs::write(locked.join("probe"), "").is_ok() { "/sys" } else { "locked" }
 }
 
-/// Everything in a folder and below it: the content of files, `None` for folders.
+/// Everything in a folder, recursively: the content of files, `None` for folders.
 fn listing(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
     let mut all = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -217,12 +217,12 @@ fn listing(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
     all
 }
 
-/// A text with one space between the words of a line, whatever the widths of its columns.
+/// A text with repeated spaces collapsed, so that column widths do not matter.
 fn in_cells(text: &str) -> String {
     text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ") + "\n").collect()
 }
 
-/// A scene, or a file of one.
+/// The path of a scene, or of a file in it.
 fn scene(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(name)
 }
@@ -244,7 +244,7 @@ fn read_pfm(path: impl AsRef<Path>) -> Plane<f32> {
     map
 }
 
-/// Reads a map in TIFF, whose invalid pixels are NaN.
+/// Reads a TIFF map, whose invalid pixels are NaN.
 fn read_tiff(path: impl AsRef<Path>) -> Plane<f32> {
     let mut decoder = tiff::decoder::Decoder::new(fs::File::open(path).unwrap()).unwrap();
     let (width, height) = decoder.dimensions().unwrap();
@@ -252,7 +252,7 @@ fn read_tiff(path: impl AsRef<Path>) -> Plane<f32> {
     Plane::new(width as usize, height as usize, values)
 }
 
-/// A folder with a pair of 60 x 40 pixels without calib.txt, and with much that is wrong.
+/// A folder with a pair of 60 x 40 pixels without calib.txt, and many faulty files.
 fn workshop() -> Folder {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
@@ -269,11 +269,11 @@ fn workshop() -> Folder {
     fs::create_dir_all(at("folder/full")).unwrap();
     fs::write(at("folder/full/of"), "something").unwrap();
     image::GrayImage::from_pixel(60, 40, image::Luma([90])).save(at("flat.png")).unwrap();
-    // The second and the third are where outputs beside taken.tif would be.
+    // The second and third are where outputs beside taken.tif would be.
     for name in ["taken.pfm", "taken.raw.tif", "taken.validity.png", "taken.png", "misfit", "broken"] {
         fs::create_dir(at(name)).unwrap();
     }
-    // Inputs with the name of an output.
+    // An input with the name of an output.
     copied("right.png", "view.preview.png");
     fs::write(at("syntax.toml"), "levels = 3\nmatching sad\n").unwrap();
     fs::write(at("key.toml"), "# a comment\nlevel = 3\n").unwrap();
@@ -291,7 +291,7 @@ fn workshop() -> Folder {
         copied("left.png", &format!("{name}/left.png"));
         fs::write(at(name).join("calib.txt"), calib).unwrap();
     }
-    // Folders to evaluate, each with one thing wrong.
+    // Folders to evaluate, each with one fault.
     for file in ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt"] {
         copy("slanted", &at(&format!("without-{file}")));
         for other in [file, "mask0nocc.png"] {
@@ -307,17 +307,17 @@ fn workshop() -> Folder {
     copied("misfit/calib.txt", "broken/calib.txt");
     let cameras = fs::read_to_string(scene("raw/cameras.yml")).unwrap();
     fs::write(at("no-unit.yml"), cameras.replace("unit: m\n", "")).unwrap();
-    // A pair whose map would take the place of its left image.
+    // A pair whose map would overwrite its left image.
     fs::write(at("pairs.csv"), "name,left,right\nleft,left.png,right.png\n").unwrap();
     fs::write(at("unknown.pfm"), b"Pf\n1 1\n-1.0\n\0\0\x80\x7f").unwrap();
-    // Files that are nearly images.
+    // Files that are almost images.
     image::GrayImage::new(1, 1).save(at("dot.png")).unwrap();
     fs::write(at("a.gif"), b"GIF89a\x01\0\x01\0\0\0\0").unwrap();
     fs::write(at("a.jpg"), &files::jpeg(&[9], None, None)[..90]).unwrap();
     fs::write(at("a.pgm"), b"P5\n60 40\n255\n1234").unwrap();
     fs::write(at("a.pfm"), b"Pf\n60 40\n0\n1234").unwrap();
     fs::write(at("a.tif"), b"II*\0\x08\0\0\0\x01\0").unwrap();
-    // One bit of the pixels has flipped.
+    // One bit of the pixels is flipped.
     let mut flipped = left.clone();
     let middle = flipped.len() / 2;
     flipped[middle] ^= 1;
@@ -328,23 +328,23 @@ fn workshop() -> Folder {
     folder
 }
 
-/// A machine without any Vulkan driver; Metal is always there.
+/// An environment without Vulkan drivers; Metal is always available.
 const NO_DRIVER: &[(&str, &str)] =
     &[("VK_DRIVER_FILES", "/nonexistent"), ("VK_ICD_FILENAMES", "/nonexistent"), ("VK_ADD_DRIVER_FILES", "")];
 
-/// Whether there is a driver to run on; a panic where there is none and `MRFGS_REQUIRE_GPU` is set and not 0.
+/// Whether there is a driver. Panics without one if `MRFGS_REQUIRE_GPU` is set and not 0.
 fn has_gpu() -> bool {
     let found = !gpu::devices().is_empty();
     let required = std::env::var("MRFGS_REQUIRE_GPU").is_ok_and(|v| v != "0" && !v.is_empty());
     assert!(found || !required, "MRFGS_REQUIRE_GPU is set and there is no driver");
     if !found {
-        // Past the capture of the test harness: a test without its GPU must not look like one that passed.
+        // Written past the capture of the test harness, as a skipped test must not look like a passed one.
         let _ = writeln!(std::io::stderr(), "SKIPPED on the GPU: there is no driver");
     }
     found
 }
 
-/// The program, its commands and theirs.
+/// The program, its commands and their subcommands.
 const COMMANDS: [&str; 17] = [
     "",
     "demo",
@@ -374,7 +374,7 @@ fn help_fits_a_terminal_of_80_columns() {
         for line in help.lines() {
             assert!(line.chars().count() <= 80, "{command}: {line}");
         }
-        // An example that does not fit is wrapped, and goes on in a line of its own.
+        // Examples must fit: longer ones would be wrapped onto a second line.
         for line in examples.lines().take_while(|line| !line.is_empty()) {
             let begins = ["  mrfgs ", "  # ", "  cargo "].iter().any(|begin| line.starts_with(begin));
             assert!(begins, "{command}: {line}");
@@ -383,24 +383,24 @@ fn help_fits_a_terminal_of_80_columns() {
 }
 
 #[test]
-fn devices_say_what_auto_takes() {
+fn devices_show_what_auto_uses() {
     let folder = Folder::new();
     let told = run(&folder, "devices").succeeded();
-    assert!(told.stdout.lines().last().unwrap().contains("`auto` takes "), "{told:?}");
+    assert!(told.stdout.lines().last().unwrap().contains("`auto` uses "), "{told:?}");
 }
 
 #[test]
-fn the_later_word_counts() {
+fn later_flags_override_earlier_ones() {
     let folder = Folder::new();
     let keys = "levels = 3\nschedule.iterations = 2\n[cost]\nmatching = \"ad-census\"\noutside-cost = 1\n";
     fs::write(folder.join("my.toml"), keys).unwrap();
     let line = "evaluate @wall --json - --set levels=2 --set graph.levels=1 --method paper --method my.toml";
     let method = &run(&folder, line).succeeded().json()["method"];
     assert_eq!(method["graph"]["levels"], 1, "--set after --method, the last --set last");
-    assert_eq!(method["schedule"]["iterations"], 2, "a file after the preset");
+    assert_eq!(method["schedule"]["iterations"], 2, "a file overrides the preset");
     let cost = &method["cost"];
     assert_eq!((&cost["matching"], &cost["outside-cost"]), (&"ad-census".into(), &1.0.into()));
-    assert_eq!(method["messages"]["potential"], "hard", "--method before all");
+    assert_eq!(method["messages"]["potential"], "hard", "--method comes first");
 }
 
 #[test]
@@ -458,7 +458,7 @@ fn help_teaches() {
     let help = |line: &str| {
         let told = run(&folder, line).succeeded();
         assert_eq!(told.stderr, "");
-        // As it is wrapped depends on the terminal.
+        // Wrapping depends on the terminal.
         told.stdout.split_whitespace().collect::<Vec<_>>().join(" ")
     };
     let text = help("match --help");
@@ -476,7 +476,7 @@ fn help_teaches() {
 }
 
 #[test]
-fn the_version_names_what_a_report_needs() {
+fn the_version_lists_wgpu_and_drivers() {
     let folder = Folder::new();
     let told = run(&folder, "--version").succeeded().stdout;
     let mut lines = told.lines();
@@ -492,7 +492,7 @@ fn the_version_names_what_a_report_needs() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_reader_that_leaves_early_is_no_failure() {
+fn a_closed_pipe_is_no_failure_for_text() {
     let folder = Folder::new();
     let mut child = started(&folder, "presets");
     drop(child.stdout.take());
@@ -503,10 +503,10 @@ fn a_reader_that_leaves_early_is_no_failure() {
     Run::of("presets", output).failed(1, "standard output");
 }
 
-/// What is asked for with `-` and would reach nobody is refused before any computing; text may go nowhere.
+/// Data for `-` that nobody would receive is refused before any computing; text may be discarded.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_standard_output_that_takes_nothing_is_told() {
+fn an_unusable_standard_output_is_reported() {
     let folder = workshop();
     let redirected = |line: &str, to: &str| {
         let mut shell = Command::new("sh");
@@ -523,10 +523,10 @@ fn a_standard_output_that_takes_nothing_is_told() {
         (&*format!("{truth} --json -"), ">&-", 1, "standard output & is closed"),
         ("sequence lef*.png righ*.png - --max-disparity 9", ">&-", 1, "standard output & is closed"),
         ("inspect left.png right.png --max-disparity 9 --json -", ">&-", 1, "standard output & is closed"),
-        (map, "1<left.png", 1, "standard output & for reading alone"),
-        ("presets", "1<left.png", 1, "standard output & for reading alone"),
-        ("--help", "1<left.png", 1, "standard output & for reading alone"),
-        ("completions bash", "1<left.png", 1, "standard output & for reading alone"),
+        (map, "1<left.png", 1, "standard output & opened read-only"),
+        ("presets", "1<left.png", 1, "standard output & opened read-only"),
+        ("--help", "1<left.png", 1, "standard output & opened read-only"),
+        ("completions bash", "1<left.png", 1, "standard output & opened read-only"),
         (&*format!("{map} --quiet"), ">/dev/full", 1, "standard output & No space left"),
         ("--help", ">/dev/full", 1, "standard output & No space left"),
         ("sequence - out --max-disparity 9", "<&-", 1, "standard input"),
@@ -534,7 +534,7 @@ fn a_standard_output_that_takes_nothing_is_told() {
         redirected(line, to).failed(code, words);
         assert!(listing(&folder) == before, "{line} {to}");
     }
-    // To nowhere by name, and text that nobody asked for.
+    // Discarding by name is allowed, and so is discarding text.
     redirected(map, ">/dev/null").succeeded();
     redirected(truth, ">&-").succeeded();
     redirected("match left.png right.png out.pfm --max-disparity 9 --device cpu", ">&- 2>&- <&-").succeeded();
@@ -562,6 +562,6 @@ fn shells_and_readers_get_every_flag() {
     for flag in ["max\\-disparity", "side\\-by\\-side", "memory"] {
         assert!(page.contains(flag), "no {flag} in:\n{page}");
     }
-    // Again, over what is there.
+    // Existing pages are overwritten.
     run(&folder, "man pages").succeeded();
 }

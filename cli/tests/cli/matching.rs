@@ -1,4 +1,4 @@
-//! `mrfgs match` and `mrfgs inspect`: what they write and say.
+//! `mrfgs match` and `mrfgs inspect`: outputs and messages.
 
 use std::io::{BufRead, BufReader, Read};
 
@@ -27,14 +27,14 @@ fn match_writes_every_output_in_every_format() {
     assert_eq!([map.size(), raw.size(), validity.size(), confidence.size()], [(240, 180); 4]);
     let preview = image::open(at("a.preview.png")).unwrap();
     assert_eq!((preview.width(), preview.color()), (240, image::ColorType::Rgb8));
-    assert!(preview.height() > 180, "the scale is below the map");
+    assert!(preview.height() > 180, "the colour bar is below the map");
     let (mut measured, mut filled) = (0, 0);
     for y in 0..180 {
         for x in 0..240 {
             let masked = x > 200 && y < 9;
             let flags = validity[(x, y)];
             assert_eq!(masked, flags & flag::MASKED != 0, "{x}, {y}");
-            assert_eq!(masked, !map[(x, y)].is_finite(), "all is filled but what is masked");
+            assert_eq!(masked, !map[(x, y)].is_finite(), "only masked pixels stay unfilled");
             assert_eq!(masked, !raw[(x, y)].is_finite());
             assert!(masked || (0.0..=31.0).contains(&map[(x, y)]), "{}", map[(x, y)]);
             assert!((flags & (flag::INVALID | flag::LOW_CONFIDENCE)).count_ones() <= 1, "{flags}");
@@ -45,9 +45,9 @@ fn match_writes_every_output_in_every_format() {
     }
     assert!(measured > 20_000 && filled > 500, "{measured} measured, {filled} filled");
     assert!(confidence.data().iter().any(|&c| c > 80));
-    assert!(map != raw, "post-processing does something");
+    assert!(map != raw, "post-processing changes the map");
 
-    // The same map in the other formats; the number of threads changes nothing.
+    // The same map in the other formats; the number of threads does not matter.
     for (output, raw_output, step) in [
         ("b.png", "b.raw.png", 256.0),
         ("c.tiff", "c.raw.tiff", f32::INFINITY),
@@ -59,7 +59,7 @@ fn match_writes_every_output_in_every_format() {
         for (name, expected) in [(output, &map), (raw_output, &raw)] {
             let same = read::read_disparity(&at(name)).unwrap();
             for (a, b) in same.data().iter().zip(expected.data()) {
-                // In 16-bit PNG a disparity of 0 is 1/256.
+                // In 16-bit PNG a disparity of 0 is stored as 1/256.
                 let none = (a * step - 1.0).abs() < 1e-6 && *b == 0.0;
                 assert!(a.total_cmp(b).is_eq() || none, "{name}: {a} and {b}");
             }
@@ -67,13 +67,13 @@ fn match_writes_every_output_in_every_format() {
     }
     let tiff = read_tiff(at("c.tiff"));
     assert!(tiff[(239, 0)].is_nan() && tiff[(0, 0)].is_finite(), "invalid is NaN in TIFF");
-    // The last row of a PFM file is the top one.
+    // The last row of a PFM file is the top row.
     let pfm = fs::read(at("a.pfm")).unwrap();
     assert!(pfm.ends_with(&f32::INFINITY.to_le_bytes()), "invalid is +inf in PFM");
     let png = image::open(at("b.png")).unwrap().into_luma16();
     assert!(png.get_pixel(239, 0).0 == [0] && png.get_pixel(0, 0).0 != [0], "invalid is 0 in PNG");
 
-    // Without the fill, what is invalid stays so.
+    // Without the fill, invalid pixels stay invalid.
     run(&folder, &format!("{line} d.pfm --set fill=row --set fill=none --also validity")).succeeded();
     let map = read::read_disparity(&at("d.pfm")).unwrap();
     let validity = read::grey8(&at("d.validity.png")).unwrap();
@@ -81,13 +81,13 @@ fn match_writes_every_output_in_every_format() {
     assert!(map.data().iter().filter(|d| !d.is_finite()).count() > 1000);
 
     let names: Vec<_> = listing(&folder).into_keys().collect();
-    assert_eq!(names.len(), 14, "nothing else is left: {names:?}");
+    assert_eq!(names.len(), 14, "no other files: {names:?}");
 }
 
 #[test]
 fn ranges_may_be_negative() {
     let folder = workshop();
-    // With the views swapped, every disparity has the other sign.
+    // With swapped views every disparity has the opposite sign.
     run(&folder, "match right.png left.png out.tif --min-disparity -31 --max-disparity -1").succeeded();
     let map = read::read_disparity(&folder.join("out.tif")).unwrap();
     assert_eq!(map.size(), (60, 40));
@@ -95,7 +95,7 @@ fn ranges_may_be_negative() {
 }
 
 #[test]
-fn a_range_is_found_where_none_is_given() {
+fn a_missing_range_is_estimated() {
     let folder = Folder::new();
     for (from, to) in [("im0.png", "left.png"), ("im1.png", "right.png"), ("disp0GT.pfm", "truth.pfm")] {
         fs::copy(scene("mixed").join(from), folder.join(to)).unwrap();
@@ -111,14 +111,14 @@ fn a_range_is_found_where_none_is_given() {
         assert!(numbers[0] <= least && numbers[1] >= most, "{line} and the truth is {least} to {most}");
         assert!(numbers[1] - numbers[0] < 1.5 * (most - least), "{line} and the truth is {least} to {most}");
     }
-    // What the user says counts.
+    // The user's limit takes precedence.
     let line = "match left.png right.png out.pfm --max-disparity auto --min-disparity 2";
     run(&folder, line).succeeded().says("disparities 2 to ");
 }
 
-/// Two surfaces that are far away have sparse matches. A near one is too noisy for these, but not for the match.
+/// Two distant surfaces have sparse matches; a near one is too noisy for these, but not for the match.
 #[test]
-fn a_range_that_was_found_is_widened_where_the_scene_goes_beyond_it() {
+fn an_estimated_range_is_widened_if_the_scene_exceeds_it() {
     let folder = Folder::new();
     let noise = |x: u32, y: u32, seed: u32| {
         let v = (x.wrapping_mul(7919) + y.wrapping_mul(104_729) + seed.wrapping_mul(15_485_863))
@@ -144,7 +144,7 @@ fn a_range_that_was_found_is_widened_where_the_scene_goes_beyond_it() {
     assert!(fs::read_to_string(folder.join("out.json")).unwrap().contains("\"labels\": 61"));
     let map = read::read_disparity(&folder.join("out.pfm")).unwrap();
     assert!((47.0..49.0).contains(&map[(200, 200)]), "{}", map[(200, 200)]);
-    // Frames are matched over the same range as that of the first one.
+    // All frames use the range of the first one.
     for name in ["left", "right"] {
         fs::create_dir(folder.join(name)).unwrap();
         fs::copy(folder.join(format!("{name}.png")), folder.join(name).join("1.png")).unwrap();
@@ -152,15 +152,15 @@ fn a_range_that_was_found_is_widened_where_the_scene_goes_beyond_it() {
     let sequence = run(&folder, "sequence left right maps --method fast").succeeded();
     sequence.says("disparities 0 to 60 in a second match, because the scene of the first frame goes beyond");
     assert_eq!(fs::read(folder.join("maps/1.pfm")).unwrap(), fs::read(folder.join("out.pfm")).unwrap());
-    // A user's own range stays.
+    // A user's own range is kept.
     run(&folder, "match left.png right.png out.pfm --method fast --max-disparity 40")
         .succeeded()
         .says("41 labels");
 }
 
-/// Whoever has rectified a pair by a calibration that is not of these cameras is not told to rectify it.
+/// If the pair was rectified with a wrong calibration, the warning does not suggest to rectify it.
 #[test]
-fn rows_that_do_not_line_up_after_rectification_are_told() {
+fn misaligned_rows_after_rectification_are_reported() {
     let folder = Folder::new();
     let raw = |name: &str| scene("raw").join(name).display().to_string();
     let right = image::open(raw("right.png")).unwrap();
@@ -192,9 +192,9 @@ fn a_pair_that_is_not_rectified_is_named() {
     }
 }
 
-/// A range that is found has negative disparities then, and says nothing of what the user knows.
+/// The estimated range then has negative disparities, so it is not checked against the warning.
 #[test]
-fn swapped_views_are_told_whatever_the_range() {
+fn swapped_views_are_reported_for_any_range() {
     let folder = Folder::new();
     copy("mixed", &folder.join("mixed"));
     let views = "mixed/im1.png,mixed/im0.png";
@@ -213,9 +213,9 @@ fn swapped_views_are_told_whatever_the_range() {
 }
 
 #[test]
-fn what_stands_for_no_data_is_ignored() {
+fn no_data_values_are_ignored() {
     let folder = Folder::new();
-    // A border of 255 on the left, which no other pixel has.
+    // A border of 255 on the left; no other pixel has that value.
     for (from, to) in [("im0.png", "left.png"), ("im1.png", "right.png")] {
         let mut image = image::open(scene("mixed").join(from)).unwrap().to_luma8();
         for (x, _, pixel) in image.enumerate_pixels_mut() {
@@ -236,7 +236,7 @@ fn what_stands_for_no_data_is_ignored() {
 }
 
 #[test]
-fn a_range_that_cuts_off_the_scene_is_told() {
+fn a_range_that_clips_the_scene_is_reported() {
     let folder = Folder::new();
     let said = |more: &str| {
         let line = "match @mixed/im0.png @mixed/im1.png out.pfm --device cpu";
@@ -285,8 +285,8 @@ fn inspect_shows_every_step() {
 
 #[cfg(unix)]
 #[test]
-fn what_is_stopped_leaves_nothing_behind() {
-    // `inspect` once its folder is begun, `evaluate` once it has told of the first pair.
+fn a_stopped_run_leaves_nothing_behind() {
+    // `inspect` once its folder exists, `evaluate` once it has reported the first pair.
     for (signal, line) in [
         ("-INT", "inspect @mixed/im0.png @mixed/im1.png steps --json told.json"),
         ("-TERM", "evaluate @slanted @mixed --report report"),
@@ -306,13 +306,13 @@ fn what_is_stopped_leaves_nothing_behind() {
         told.read_to_string(&mut said).unwrap();
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(130), "{line}: {said}");
-        assert_eq!(said.lines().last(), Some("mrfgs: stopped; nothing is left behind"), "{line}");
+        assert_eq!(said.lines().last(), Some("mrfgs: stopped; no output was left behind"), "{line}");
         assert_eq!(output.stdout, b"", "{line}");
         assert!(listing(&folder).is_empty(), "{line}: {:?}", listing(&folder).keys());
     }
 }
 
-/// A pipe that nobody writes to keeps no match from being stopped by the first signal.
+/// A pipe without a writer does not delay the first signal.
 #[cfg(unix)]
 #[test]
 fn a_wait_for_input_is_stopped_at_once() {
@@ -378,7 +378,7 @@ fn a_dry_run_prints_the_plan_and_leaves_nothing() {
     assert!(listing(&folder) == before);
 }
 
-/// What `--memory` lets a match take decides on tiles, which are told.
+/// A small `--memory` leads to tiles, which are reported.
 #[test]
 fn little_memory_makes_tiles() {
     let folder = workshop();
@@ -398,7 +398,7 @@ fn little_memory_makes_tiles() {
         let row = told.stdout.lines().find(|line| line.starts_with(&format!("{stage}  "))).unwrap();
         assert_eq!(row.split_whitespace().rev().nth(3), Some(&*runs.to_string()), "{row}");
     }
-    // Steps of one piece are what the folder shows.
+    // The folder of steps needs a match without tiles.
     let before = listing(&folder);
     inspect("steps").failed(2, "DIR & in one piece & give --memory");
     assert!(listing(&folder) == before);
@@ -428,20 +428,20 @@ fn inspect_names_every_stage() {
     assert!(row("all ").unwrap().ends_with(" 100.0 %"), "{table}");
     assert!(row("flood, level 5").unwrap().split_whitespace().nth(3) == Some("15"), "{table}");
     assert!(!table.contains("dispatches"), "{table}");
-    assert!(listing(&folder) == before, "without DIR it writes nothing");
+    assert!(listing(&folder) == before, "no files without DIR");
 }
 
 #[cfg(not(target_os = "macos"))]
 #[test]
-fn without_a_driver_auto_takes_the_cpu_path() {
+fn without_a_driver_auto_uses_the_cpu_path() {
     let folder = workshop();
     let line = "match left.png right.png out.pfm --max-disparity 9 --device auto";
     run_with(&folder, line, NO_DRIVER).succeeded().says(" on the CPU path, ");
     let told = run_with(&folder, "devices", NO_DRIVER).succeeded();
-    assert_eq!(told.stdout, "no Vulkan or Metal driver found: `auto` takes the CPU path\n");
+    assert_eq!(told.stdout, "no Vulkan or Metal driver found: `auto` uses the CPU\n");
 }
 
-/// Without `--threads` the environment may ask for fewer than there are processors; with it there are no more than the work takes.
+/// Without `--threads` the environment may limit the threads; there are never more than the work needs.
 #[test]
 fn threads_follow_the_environment_and_the_work() {
     let folder = Folder::new();
@@ -456,7 +456,7 @@ fn threads_follow_the_environment_and_the_work() {
         run("", Some(name)).says(" on the CPU path, 1 thread\n");
     }
     let expected = map();
-    // What is said counts more.
+    // --threads overrides the environment.
     run("--threads 3", Some("OMP_NUM_THREADS")).says(" on the CPU path, 3 threads\n");
     assert!(map() == expected);
     let told = run("--threads 1024", None).stderr;
@@ -466,7 +466,7 @@ fn threads_follow_the_environment_and_the_work() {
     assert!((3..=most).contains(&count.parse().unwrap()), "{told}");
 }
 
-/// A JPEG file of a view of a scene, or of both beside each other, in the order of their numbers.
+/// A JPEG file of one view of a scene, or of several side by side, in this order.
 fn jpeg_of(views: &[usize]) -> Vec<u8> {
     let images =
         views.iter().map(|view| image::open(scene(&format!("slanted/im{view}.png"))).unwrap().to_rgb8());
@@ -480,9 +480,9 @@ fn jpeg_of(views: &[usize]) -> Vec<u8> {
     file.into_inner()
 }
 
-/// Data that the decoder makes up for is told with the name of the file, by every command that reads pairs.
+/// Damage that the decoder conceals is reported with the file name, by every command that reads pairs.
 #[test]
-fn a_damaged_jpeg_is_named() {
+fn a_damaged_jpeg_is_reported() {
     let folder = Folder::new();
     let sound = jpeg_of(&[1]);
     let middle = sound.len() / 2;
@@ -519,7 +519,7 @@ fn a_damaged_jpeg_is_named() {
     run(&folder, "batch pairs.csv out --device cpu").succeeded().says("r.jpg: the JPEG data is damaged");
 }
 
-/// Both views in one file give the map of its halves, the right view on the left.
+/// One file with both views, right view first, gives the map of its halves.
 #[test]
 fn both_views_may_be_in_one_file() {
     let folder = Folder::new();
@@ -532,7 +532,7 @@ fn both_views_may_be_in_one_file() {
     run(&folder, &format!("match left.png right.png wanted.pfm {flags}")).succeeded();
     fs::write(folder.join("pairs.csv"), "name,left,right,max_disparity\na,both.jps,,31\n").unwrap();
     run(&folder, "batch pairs.csv out --device cpu").succeeded();
-    // The decoder of the tests may round chroma in another way.
+    // The test's decoder may round chroma differently.
     let (wanted, found) = (read_pfm(folder.join("wanted.pfm")), read_pfm(folder.join("out/a.pfm")));
     let same = |a: &Plane<f32>, b: &Plane<f32>| {
         a.data().iter().zip(b.data()).filter(|(a, b)| (*a - *b).abs() < 0.5).count() * 100 / a.data().len()
@@ -540,12 +540,12 @@ fn both_views_may_be_in_one_file() {
     assert!(same(&wanted, &found) > 97, "{}", same(&wanted, &found));
     run(&folder, &format!("match right.png left.png swapped.pfm {flags}")).succeeded();
     assert!(same(&read_pfm(folder.join("swapped.pfm")), &found) < 50);
-    // Flags may stand between the file and what follows.
+    // Flags may stand between the positional arguments.
     run(&folder, "match both.jps --max-disparity 31 --device cpu found.pfm --quiet").succeeded();
     let at = |name: &str| fs::read(folder.join(name)).unwrap();
     assert!(at("found.pfm") == at("out/a.pfm"));
     run(&folder, "inspect both.jps --max-disparity 31 --device cpu --json -").succeeded();
-    // Where the file does not say which half is which, its matches do.
+    // If the file does not say which half is which, matches decide.
     fs::write(folder.join("turned.jps"), jpeg_of(&[0, 1])).unwrap();
     run(&folder, &format!("match turned.jps turned.pfm {flags}")).succeeded();
     assert!(same(&wanted, &read_pfm(folder.join("turned.pfm"))) > 97);
@@ -555,7 +555,7 @@ fn both_views_may_be_in_one_file() {
     run(&folder, "rectify left.png").failed(2, "RIGHT & missing & left.png holds one view");
 }
 
-/// Whole numbers in a map are disparities by their scale, whatever the format.
+/// Integers in a map are divided by their scale, in any format.
 #[test]
 fn maps_of_whole_numbers_take_their_scale() {
     let folder = Folder::new();

@@ -1,22 +1,21 @@
-//! What `mrfgs match` and `mrfgs evaluate` write besides maps and figures: depth, JSON, pictures, submissions.
+//! Outputs of `mrfgs match` and `mrfgs evaluate` besides maps and figures: depth, JSON, pictures, submissions.
 
 use mrfgs::maps::{flag, has_disparity};
 use mrfgs::options::Method;
 
 use super::*;
 
-/// Focal length and baseline of the scenes of 240 x 180 pixels and 32 labels, and the middle of their images.
+/// Focal length and baseline of the scenes of 240 x 180 pixels and 32 labels, and the centre of their images.
 pub(super) const FOCAL_LENGTH: f64 = 180.0;
 pub(super) const BASELINE: f64 = 0.95 * 31.0 / 180.0;
 pub(super) const MIDDLE: [f64; 2] = [119.5, 89.5];
 
-/// Matches a scene in `folder`; what it says on standard error.
+/// Matches a scene in `folder` and returns the messages.
 pub(super) fn matched(folder: &Path, name: &str, more: &str) -> String {
     run(folder, &format!("match @{name}/im0.png @{name}/im1.png {more} --device cpu")).succeeded().stderr
 }
 
-/// The largest relative error of `depths` against baseline * f / (d + doffs); infinite where one of the two has a pixel that
-/// the other should not have.
+/// The largest relative error of `depths` against baseline * f / (d + doffs); infinite if they differ in which pixels are known.
 fn depth_error(depths: &Plane<f32>, disparities: &Plane<f32>, doffs: f64) -> f64 {
     assert_eq!(depths.size(), disparities.size());
     let pairs = depths.data().iter().zip(disparities.data());
@@ -37,17 +36,17 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 }
 
 #[test]
-fn depth_is_that_of_the_cameras() {
+fn depth_follows_from_the_cameras() {
     let folder = Folder::new();
     let said = matched(&folder, "repetitive", "d.pfm --also depth --set fill=none");
     let told = said.lines().find(|line| line.contains("depths ")).unwrap();
-    assert!(told.contains("unit: m, by ") && told.ends_with("calib.txt"), "{told}");
+    assert!(told.contains("unit: m, from ") && told.ends_with("calib.txt"), "{told}");
     let (disparities, depths) = (read_pfm(folder.join("d.pfm")), read_pfm(folder.join("d.depth.pfm")));
     assert!(depth_error(&depths, &disparities, 0.0) < 1e-6);
-    assert!(depth_error(&depths, &disparities, 0.1) > 1e-3, "the comparison sees a tenth of a pixel");
-    assert!(depths.data().contains(&f32::INFINITY), "what has no disparity has no depth");
+    assert!(depth_error(&depths, &disparities, 0.1) > 1e-3, "the comparison detects a tenth of a pixel");
+    assert!(depths.data().contains(&f32::INFINITY), "no depth without a disparity");
 
-    // The wall behind is parallel to the images, at depth 2.8.
+    // The back wall is parallel to the image plane, at depth 2.8.
     let truth = read_pfm(scene("repetitive/disp0GT.pfm"));
     let wall = (BASELINE * FOCAL_LENGTH / 2.8) as f32;
     let known =
@@ -57,9 +56,9 @@ fn depth_is_that_of_the_cameras() {
     assert!((median(known.clone()) - 2.8).abs() < 0.02, "{}", median(known));
 }
 
-/// Each measured pixel has an error, which falls as its confidence rises; that of its depth follows from the cameras.
+/// Each measured pixel has an error, which falls with its confidence; its depth error follows from the cameras.
 #[test]
-fn errors_are_those_of_confidence_and_cameras() {
+fn errors_follow_from_confidence_and_cameras() {
     let folder = Folder::new();
     let named = |name: &str, end: &str| read_pfm(folder.join(format!("{name}.{end}")));
     let also = "--also depth,sigma,depth-sigma,confidence,validity";
@@ -85,7 +84,7 @@ fn errors_are_those_of_confidence_and_cameras() {
     let sigmas: Vec<f32> = by_confidence.into_values().collect();
     assert!(sigmas.is_sorted_by(|a, b| a >= b) && sigmas[0] > 4.0 * sigmas[sigmas.len() - 1], "{sigmas:?}");
 
-    // `fast` has another scale of confidence. TIFF stays TIFF, and limits count.
+    // `fast` has another scale of confidence. TIFF output stays TIFF, and limits apply.
     matched(&folder, "slanted", "fast.tif --method fast --also sigma --min-confidence 20 --quiet");
     let known = |map: &Plane<f32>| map.data().iter().filter(|v| v.is_finite()).count();
     let (map, sigmas) = (read_tiff(folder.join("fast.tif")), read_tiff(folder.join("fast.sigma.tif")));
@@ -96,16 +95,16 @@ fn errors_are_those_of_confidence_and_cameras() {
     assert!(known(&named("near", "sigma.pfm")) + 500 < 240 * 180 - filled);
 
     let of_map = run(&folder, "depth d.pfm --calib @slanted/calib.txt --also sigma");
-    of_map.failed(2, "--also sigma: is found by a match, and MAP does not hold it");
+    of_map.failed(2, "--also sigma: can only be computed by a match, not from MAP");
     fs::copy(scene("slanted/im0.png"), folder.join("l.png")).unwrap();
     fs::copy(scene("slanted/im1.png"), folder.join("r.png")).unwrap();
     run(&folder, "match l.png r.png no.pfm --max-disparity 31 --also depth-sigma")
-        .failed(2, "--also depth-sigma: takes the cameras");
+        .failed(2, "--also depth-sigma: needs camera values");
 }
 
-/// What `match` writes beside its map, `depth` makes of the map afterwards.
+/// `depth` computes from a map what `match` writes beside it.
 #[test]
-fn depth_and_points_of_a_map_that_is_there() {
+fn depth_and_points_of_an_existing_map() {
     let folder = Folder::new();
     let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
     let also = "--also depth,depth-mm,points,points.las,side-by-side";
@@ -116,7 +115,7 @@ fn depth_and_points_of_a_map_that_is_there() {
     }
     let more = "--left @mixed/im0.png --calib @mixed/calib.txt --confidence again/d.confidence.png";
     let told = run(&folder, &format!("depth again/d.pfm {more} {also}")).succeeded();
-    told.says("unit: m, by");
+    told.says("unit: m, from");
     for end in ["depth.pfm", "depth-mm.png", "points.ply", "points.las"] {
         assert!(bytes(&format!("d.{end}")) == bytes(&format!("again/d.{end}")), "{end}");
     }
@@ -125,7 +124,7 @@ fn depth_and_points_of_a_map_that_is_there() {
         read_tiff(folder.join("other.depth.tif")).data().iter().filter(|depth| depth.is_finite()).count()
             > 1000
     );
-    // Limits, here and in a match.
+    // Limits, in `depth` and in `match`.
     run(
         &folder,
         &format!("depth again/d.pfm {more} --also depth,points --clip-depth 2 --min-confidence 60 --quiet"),
@@ -174,9 +173,9 @@ fn depth_and_points_of_a_map_that_is_there() {
         .failed(2, "--clip-depth & --also depth");
 }
 
-/// What shows nothing in front of the cameras is refused, and what shows little is told, with the sign that would help.
+/// A map entirely behind the cameras is refused, a mostly hidden one causes a warning; both suggest the other sign.
 #[test]
-fn depth_of_what_is_behind_the_cameras() {
+fn maps_behind_the_cameras_are_reported() {
     let folder = Folder::new();
     let map = |name: &str, disparity: &dyn Fn(usize) -> f32| {
         let rows: Vec<u8> = (0..320 * 240).flat_map(|i| disparity(i).to_le_bytes()).collect();
@@ -191,21 +190,19 @@ fn depth_of_what_is_behind_the_cameras() {
     let depth = |line: &str| run(&folder, &format!("depth {line} --calib @mixed/calib.txt"));
     let before = listing(&folder);
     for (line, words) in [
-        ("negative.pfm", "negative.pfm & 76800 of 76800 & give --sign right-minus-left"),
-        ("sound.pfm --sign right-minus-left", "sound.pfm & give --sign left-minus-right"),
-        ("zero.pfm", "zero.pfm & in front of the cameras & calibration"),
+        ("negative.pfm", "negative.pfm & 76800 of 76800 & try --sign right-minus-left"),
+        ("sound.pfm --sign right-minus-left", "sound.pfm & try --sign left-minus-right"),
+        ("zero.pfm", "zero.pfm & behind the cameras & calibration"),
         ("infinite.pfm", "infinite.pfm & no disparity"),
         ("nan.pfm", "nan.pfm & no disparity"),
     ] {
         depth(line).failed(1, words);
         assert_eq!(listing(&folder), before, "{line}");
     }
-    depth("mostly.pfm")
-        .succeeded()
-        .says("warning: mostly.pfm: 51200 of 76800 & give --sign right-minus-left");
+    depth("mostly.pfm").succeeded().says("warning: mostly.pfm: 51200 of 76800 & try --sign right-minus-left");
     let sound = depth("sound.pfm").succeeded();
     assert!(!sound.stderr.contains("warning"), "{}", sound.stderr);
-    // The remedy gives what the other map gives.
+    // The suggested remedy gives the result of the original map.
     depth("negative.pfm --sign right-minus-left").succeeded();
     let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
     assert!(bytes("negative.depth.pfm") == bytes("sound.depth.pfm"));
@@ -259,7 +256,7 @@ fn depths_that_come_out_empty() {
     assert!(!said.contains("warning"), "{said}");
 }
 
-/// Ranges by depth are those by disparity.
+/// A range of depths is equivalent to one of disparities.
 #[test]
 fn ranges_may_be_depths() {
     let folder = Folder::new();
@@ -275,7 +272,7 @@ fn ranges_may_be_depths() {
     assert!(said.contains(&format!("{} labels", nearest - farthest + 1.0)), "{said}");
     let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
     assert!(bytes("by-depth.pfm") == bytes("by-disparity.pfm"));
-    // The other sign means the same depths.
+    // The opposite sign gives the same depths.
     matched(
         &folder,
         "repetitive",
@@ -284,7 +281,7 @@ fn ranges_may_be_depths() {
     let range = |name: &str| json(folder.join(name))["range"].clone();
     assert_eq!(range("d.json")["max"].as_f64(), Some(nearest));
     assert_eq!(range("o.json")["min"].as_f64(), Some(-nearest));
-    // One end alone: infinitely far is at 0, and the nearest is that of calib.txt.
+    // With one end only, infinity has disparity 0 and the nearest depth comes from calib.txt.
     matched(&folder, "repetitive", "one.pfm --min-depth 1.3 --json one.json");
     assert_eq!(
         (range("one.json")["min"].as_f64(), range("one.json")["max"].as_f64()),
@@ -304,10 +301,10 @@ fn ranges_may_be_depths() {
     }
     fs::copy(scene("repetitive/im0.png"), folder.join("l.png")).unwrap();
     run(&folder, "match l.png @repetitive/im1.png no.pfm --min-depth 1")
-        .failed(2, "--min-depth & cameras & --calib");
+        .failed(2, "--min-depth & calibration & --calib");
 }
 
-/// How many percent of the pixels of `left` find their own disparity in `right`, moved by it, to a pixel.
+/// The percentage of pixels of `left` whose disparity in `right`, shifted by it, agrees to a pixel.
 fn agreement(left: &Plane<f32>, right: &Plane<f32>) -> usize {
     let (width, height) = left.size();
     let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
@@ -319,16 +316,16 @@ fn agreement(left: &Plane<f32>, right: &Plane<f32>) -> usize {
 }
 
 #[test]
-fn the_right_map_is_that_of_the_right_view() {
+fn the_right_map_belongs_to_the_right_view() {
     let folder = Folder::new();
     for more in ["", "--set left-right-check=off", "--memory 24MiB"] {
         matched(&folder, "mixed", &format!("d.pfm --also right {more}"));
         let [left, right] = ["d.pfm", "d.right.pfm"].map(|file| read_pfm(folder.join(file)));
         assert_eq!(left.size(), right.size());
-        // Controls: the same map does not agree with itself, nor with the right view's in a mirror.
+        // Controls: the left map agrees neither with itself nor with a mirrored right map.
         let [found, itself, mirror] = [&right, &left, &right.mirrored()].map(|map| agreement(&left, map));
         assert!(found > 85 && itself < 75 && mirror < 75, "{more}: {found}, {itself}, {mirror}");
-        // In one piece and in tiles, and with the views exchanged in a mirror, there is a value everywhere.
+        // Whole or in tiles, and with mirrored and swapped views, every pixel has a value.
         assert!(right.data().iter().all(|d| d.is_finite()), "{more}");
     }
 }
@@ -349,7 +346,7 @@ fn offset_principal_points_move_the_depth() {
         assert!(depth_error(&depths, &disparities, doffs) < 1e-6, "{doffs}");
         let beyond = depths.data().iter().filter(|z| !z.is_finite()).count();
         assert_eq!(beyond > 1000, doffs < 0.0, "{beyond} pixels are at infinity or beyond");
-        assert!(disparities.data().iter().all(|d| d.is_finite()), "the map is what it was");
+        assert!(disparities.data().iter().all(|d| d.is_finite()), "the map itself stays complete");
         let same = |(a, b): (&f32, &f32)| if b.is_finite() { a.total_cmp(b).is_eq() } else { a.is_nan() };
         assert!(
             read_tiff(at("d.depth.tif")).data().iter().zip(depths.data()).all(same),
@@ -364,17 +361,17 @@ fn a_calibration_file_elsewhere_gives_the_range() {
     run(&folder, "match left.png right.png out.pfm --calib camera/calib.txt")
         .succeeded()
         .says(", 17 labels, ");
-    // It may hold less than depth takes, as long as nobody asks for depth.
+    // Without depth outputs it may be incomplete.
     run(&folder, "match left.png right.png out.pfm --max-disparity 9 --calib half/calib.txt").succeeded();
 }
 
 #[test]
-fn the_pictures_of_the_guide_are_those_of_its_commands() {
+fn the_pictures_of_the_guide_are_up_to_date() {
     let folder = Folder::new();
     matched(&folder, "mixed", "d.pfm --also preview,points");
     let at = |name: &str| folder.join(name).to_str().unwrap().to_owned();
     render_cloud::run(&[at("d.points.ply"), at("cloud.png")]).unwrap();
-    // The sines of another system may put a point into the next pixel.
+    // Another system's trigonometric functions may move a point to the next pixel.
     for (made, name, most) in
         [("d.preview.png", "disparity.png", 0), ("cloud.png", "cloud.png", 640 * 480 / 1000)]
     {
@@ -382,12 +379,12 @@ fn the_pictures_of_the_guide_are_those_of_its_commands() {
             [folder.join(made), scene("mixed").join(name)].map(|path| image::open(path).unwrap().to_rgb8());
         assert_eq!(made.dimensions(), shown.dimensions());
         let others = made.pixels().zip(shown.pixels()).filter(|(made, shown)| made != shown).count();
-        assert!(others <= most, "{name} is another picture now, in {others} pixels; replace it");
+        assert!(others <= most, "{name} has changed in {others} pixels; replace it");
     }
 }
 
 #[test]
-fn json_tells_what_ran_and_what_came_of_it() {
+fn json_describes_the_match_and_its_result() {
     let folder = workshop();
     let at = |name: &str| folder.join(name);
     let common = "left.png right.png --calib camera/calib.txt --device cpu --mask flat-mask.png";
@@ -419,7 +416,7 @@ fn json_tells_what_ran_and_what_came_of_it() {
     assert_eq!([&found["tiles"], &found["iterations"]], [1, 16]);
     let seconds = found["seconds"].as_f64().unwrap();
     assert!(seconds > 0.0 && told.stderr.contains(&format!("in {seconds:.2} s")), "{}", told.stderr);
-    assert!(found["stages"].is_null(), "the time of stages is for `inspect`");
+    assert!(found["stages"].is_null(), "only `inspect` times stages");
 
     // Shares of all pixels, in percent.
     let (validity, confidence) =
@@ -439,9 +436,9 @@ fn json_tells_what_ran_and_what_came_of_it() {
     ] {
         assert!((found[key].as_f64().unwrap() - expected).abs() < 1e-9, "{key}: {} {expected}", found[key]);
     }
-    assert!(share(&measured) > 20.0 && share(&filled) > 1.0, "neither is nothing");
+    assert!(share(&measured) > 20.0 && share(&filled) > 1.0, "both occur");
 
-    // Printed, standard output holds nothing else.
+    // With `-`, standard output contains nothing else.
     let printed = run(&folder, &format!("{line} --json -")).succeeded().json();
     assert_eq!(printed["measured"], found["measured"]);
     let printed = run(&folder, &format!("inspect {common} --json -")).succeeded().json();
@@ -451,7 +448,7 @@ fn json_tells_what_ran_and_what_came_of_it() {
     let sum: f64 = stages.values().map(|ms| ms.as_f64().unwrap()).sum();
     assert!(sum < 1000.0 * printed["seconds"].as_f64().unwrap());
 
-    // A device has a driver.
+    // A GPU has a driver.
     if has_gpu() {
         let line = "match left.png right.png out.pfm --max-disparity 9 --device gpu --json -";
         let told = run(&folder, line).succeeded();
@@ -461,7 +458,7 @@ fn json_tells_what_ran_and_what_came_of_it() {
         assert!(!driver.is_empty() && listed.contains(&format!("| {driver} ")), "{driver} in {listed}");
     }
 
-    // A map without a pixel has no confidence.
+    // A fully masked map has no confidence.
     let all = image::GrayImage::from_pixel(60, 40, image::Luma([1]));
     all.save(at("flat-mask.png")).unwrap();
     let none = run(&folder, &format!("{line} --json -")).succeeded().json();
@@ -501,7 +498,7 @@ fn png_holds_disparities_as_kitti_reads_them() {
     let folder = workshop();
     let mask = image::GrayImage::from_fn(60, 40, |x, y| image::Luma([u8::from(x < 5 && y > 30)]));
     mask.save(folder.join("mask.png")).unwrap();
-    // A pair of the same image twice is at infinity: disparity 0, but valid.
+    // Two identical images are at infinity: disparity 0, but valid.
     for (right, most) in [("right.png", 15), ("left.png", 3)] {
         for output in ["out.pfm", "out.png"] {
             let line = format!("match left.png {right} {output} --mask mask.png --quiet");
@@ -539,10 +536,10 @@ fn standard_output_takes_the_map_and_nothing_else() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_map_that_does_not_reach_its_reader_is_a_failure() {
+fn a_map_cut_off_by_its_reader_is_a_failure() {
     let folder = workshop();
     let before = listing(&folder);
-    for (closed, words) in [(true, "its reader left"), (false, "No space left")] {
+    for (closed, words) in [(true, "the reader closed it"), (false, "No space left")] {
         let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap().into();
         let stdout = if closed { Stdio::piped() } else { full() };
         let line = "match left.png right.png - --max-disparity 9 --quiet --json m.json";
@@ -550,7 +547,7 @@ fn a_map_that_does_not_reach_its_reader_is_a_failure() {
         drop(child.stdout.take());
         let words = format!("standard output & {words}");
         Run::of(line, child.wait_with_output().unwrap()).failed(1, &words);
-        assert!(listing(&folder) == before, "{words}: something is left");
+        assert!(listing(&folder) == before, "{words}: files were left behind");
     }
 }
 
@@ -558,7 +555,7 @@ fn a_map_that_does_not_reach_its_reader_is_a_failure() {
 fn submissions_have_the_layout_of_the_benchmark() {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
-    // A folder that is there and empty will do.
+    // An existing empty folder is accepted.
     fs::create_dir(at("trainingQ")).unwrap();
     for to in ["trainingQ MR-FGS_2", "--set fill=none sparse X"] {
         let line = format!("evaluate submission {to} @slanted @thin --device cpu --json a.json");
@@ -580,11 +577,11 @@ fn submissions_have_the_layout_of_the_benchmark() {
         matched(&folder, pair, "d.pfm --quiet");
         let [dense, sparse] = [("trainingQ", "MR-FGS_2"), ("sparse", "X_s")]
             .map(|(dir, method)| fs::read(at(dir).join(pair).join(format!("disp0{method}.pfm"))).unwrap());
-        assert!(dense == fs::read(at("d.pfm")).unwrap(), "{pair}: the map of a match");
+        assert!(dense == fs::read(at("d.pfm")).unwrap(), "{pair}: same as the map of a match");
         matched(&folder, pair, "d.pfm --quiet --set fill=none");
         assert!(
             sparse == fs::read(at("d.pfm")).unwrap() && sparse != dense,
-            "{pair}: the map without a fill"
+            "{pair}: same as the map without a fill"
         );
         assert!(read_pfm(at("d.pfm")).data().contains(&f32::INFINITY));
         let time = fs::read_to_string(at("sparse").join(pair).join("timeX.txt")).unwrap();

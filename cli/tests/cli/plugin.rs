@@ -7,8 +7,8 @@ use super::*;
 /// Rows and columns at the borders without data.
 const MARGIN: usize = 6;
 
-/// What the pipeline makes of the options after the name in `--stereo-algorithm`: tokens with `=` become variables of the
-/// environment, an option without value gets the value 1, and most signs are refused.
+/// Mimics how the pipeline parses the options after the name in `--stereo-algorithm`: tokens with `=` become environment variables, an
+/// option without a value gets the value 1, and most punctuation is refused.
 fn plugin_options(options: &str) -> Vec<String> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || " _+-=.".contains(c);
     assert!(options.chars().all(allowed), "{options}");
@@ -21,7 +21,7 @@ fn plugin_options(options: &str) -> Vec<String> {
         match given.last_mut() {
             _ if is_option(token) => given.push((token.into(), Vec::new())),
             Some((_, values)) => values.push(token.into()),
-            None => panic!("{token} is no option"),
+            None => panic!("{token} is not an option"),
         }
     }
     let with_values = given.into_iter().flat_map(|(option, values)| {
@@ -31,7 +31,7 @@ fn plugin_options(options: &str) -> Vec<String> {
     with_values.collect()
 }
 
-/// Writes a view as the pipeline does: float, tone between 0 and 1, NaN where there are no data.
+/// Writes a view as the pipeline does: float, intensities from 0 to 1, NaN without data.
 fn write_view(path: &Path, view: &image::GrayImage) {
     let (width, height) = view.dimensions();
     let pixels: Vec<f32> = view
@@ -64,7 +64,7 @@ fn the_plugin_takes_and_gives_what_the_pipeline_expects() {
             .unwrap();
         (output.status.success(), String::from_utf8(output.stderr).unwrap())
     };
-    // The pipeline tells plug-ins no range.
+    // The pipeline passes no range to plug-ins.
     for options in ["--device cpu", "--device cpu --threads 1 --min-disparity -31 --max-disparity 0"] {
         let (success, told) = call(options);
         assert!(success, "{told}");
@@ -89,7 +89,7 @@ fn the_plugin_takes_and_gives_what_the_pipeline_expects() {
         assert!(errors.len() > width * height / 2 && holes > 0, "{} and {holes}", errors.len());
         assert!(errors[errors.len() / 2] < 0.25, "{}", errors[errors.len() / 2]);
     }
-    // Why the plug-in leaves holes itself: the pipeline takes no `=`, and gives every option a value.
+    // The plug-in itself keeps holes, as the pipeline refuses `=` and gives every option a value.
     let (success, told) = call("--device cpu --quiet");
     assert!(!success && told.lines().count() == 1, "{told}");
 }
@@ -117,16 +117,16 @@ fn the_sign_turns_map_and_range_around() {
     }
     assert!((1..ours.data().len() / 2).contains(&invalid), "{invalid} of {}", ours.data().len());
 
-    // Printed, what is invalid is +infinity all the same.
+    // On standard output, invalid pixels are +infinity as usual.
     let printed = program(&folder, &format!("{line} - --quiet {turned}")).output().unwrap();
     fs::write(folder.join("printed.pfm"), printed.stdout).unwrap();
     let expected = theirs.map(|&d| if d.is_nan() { f32::INFINITY } else { d });
     assert_eq!(read_pfm(folder.join("printed.pfm")), expected);
 
-    // One end alone: the far one is at 0, as it is the other way round.
+    // With one end only, infinity is at 0 for this sign, too.
     let (_, told) = matched("a.tif", "--sign right-minus-left --min-disparity -20");
     assert_eq!(range(&told), [-20, 0]);
-    // And by a calibration.
+    // The range of a calibration.
     let (_, told) = matched("b.tif", "--sign right-minus-left");
     let (_, ours) = matched("c.tif", "");
     let [min, max] = range(&ours);

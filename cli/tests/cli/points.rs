@@ -1,4 +1,4 @@
-//! Clouds of points: what is in them, where they are, and that every format holds the same.
+//! Point clouds: contents, positions, and agreement of all formats.
 
 use mrfgs::maps::flag;
 
@@ -8,13 +8,13 @@ use super::*;
 /// A point of a cloud: position, colour, confidence.
 pub(super) type Point = ([f64; 3], [u8; 3], u8);
 
-/// A level that a float holds.
+/// An integer level stored as float.
 fn whole(value: f32) -> u8 {
     assert!((0.0..=255.0).contains(&value) && value.fract() == 0.0, "{value}");
     value as u8
 }
 
-/// Reads a cloud by nothing but what its header says.
+/// Reads a PLY cloud as its header describes it.
 pub(super) fn cloud(path: &Path) -> Vec<Point> {
     let bytes = fs::read(path).unwrap();
     let end = b"end_header\n";
@@ -59,10 +59,10 @@ fn points_are_what_is_measured_and_trusted() {
     let is_trusted = |v: u8| v == 0;
     let trusted = validity.data().iter().filter(|v| is_trusted(**v)).count();
     assert_eq!(points.len(), trusted);
-    assert!(trusted > 20_000 && trusted < 240 * 180 - 1000, "some are left out: {trusted}");
+    assert!(trusted > 20_000 && trusted < 240 * 180 - 1000, "some are dropped: {trusted}");
     assert!(validity.data().iter().any(|v| v & flag::LOW_CONFIDENCE != 0));
 
-    // Each is where its pixel looks, in the order of the pixels.
+    // Each point lies on the ray of its pixel, in the order of the pixels.
     let image = image::open(scene("slanted/im0.png")).unwrap().into_rgb8();
     let pixels = (0..180).flat_map(|y| (0..240).map(move |x| (x, y)));
     for ((x, y), (position, colour, sure)) in pixels.filter(|&at| is_trusted(validity[at])).zip(&points) {
@@ -76,7 +76,7 @@ fn points_are_what_is_measured_and_trusted() {
     }
 }
 
-/// Reads PCD by nothing but what its header says.
+/// Reads a PCD cloud as its header describes it.
 fn pcd(path: &Path) -> Vec<Point> {
     let bytes = fs::read(path).unwrap();
     let end = b"\nDATA binary\n";
@@ -99,7 +99,7 @@ fn pcd(path: &Path) -> Vec<Point> {
     points.collect()
 }
 
-/// Reads uncompressed LAS by the offsets of the standard; the step of its coordinates, and the points.
+/// Reads uncompressed LAS by the offsets of the standard; returns the coordinate step and the points.
 fn las(path: &Path) -> (f64, Vec<Point>) {
     let bytes = fs::read(path).unwrap();
     let u16_at = |at: usize| u16::from_le_bytes(bytes[at..][..2].try_into().unwrap());
@@ -109,7 +109,7 @@ fn las(path: &Path) -> (f64, Vec<Point>) {
     assert_eq!((bytes[104], u16_at(105), u16_at(90), u16_at(92)), (2, 26, 0, 0), "point format, and no date");
     let (start, count, step) = (u32_at(96), u32_at(107), f64_at(131));
     assert!(bytes[131..139] == bytes[139..147] && bytes[131..139] == bytes[147..155], "one step");
-    assert_eq!(bytes[155..179], [0; 24], "positions count from the camera");
+    assert_eq!(bytes[155..179], [0; 24], "positions are relative to the camera");
     assert_eq!((bytes.len(), u32_at(111)), (start + 26 * count, count), "first returns");
     let words = String::from_utf8_lossy(&bytes[227..start]).into_owned();
     assert!(words.contains("Text Area") && words.contains("y down"), "{words}");
@@ -133,7 +133,7 @@ fn las(path: &Path) -> (f64, Vec<Point>) {
     (step, points)
 }
 
-/// The largest distance along an axis of points that are otherwise the same.
+/// The largest distance along an axis between corresponding points.
 fn apart(some: &[Point], others: &[Point]) -> f64 {
     assert_eq!(some.len(), others.len());
     let pairs = some.iter().zip(others).flat_map(|(a, b)| {
@@ -157,26 +157,26 @@ fn every_format_holds_the_same_points() {
     assert!(off > 0.0 && off <= 0.5001 * step, "{off} with steps of {step}");
     let nearest = points.iter().map(|(p, ..)| p[2]).fold(f64::MAX, f64::min);
     assert!((1e-7..=1e-6).contains(&(step / nearest)), "{step} at {nearest}");
-    // Control: the comparison sees a point that is a step off.
+    // Control: the comparison detects a point that is one step off.
     let mut moved = rounded.clone();
     moved[7].0[1] += step;
     assert!(apart(&moved, &points) > 0.5001 * step);
 
     let unpacked = las::Reader::from_path(at("d.points.laz")).unwrap().read_all().unwrap();
     let plain = fs::read(at("d.points.las")).unwrap();
-    assert!(plain.ends_with(unpacked.raw_bytes()), "packing loses nothing");
+    assert!(plain.ends_with(unpacked.raw_bytes()), "compression is lossless");
     assert_eq!(unpacked.len(), points.len());
     let bytes = |name: &str| fs::metadata(at(name)).unwrap().len();
     assert!(2 * bytes("d.points.laz") < bytes("d.points.las"), "{}", bytes("d.points.laz"));
 }
 
-/// The floor of `repetitive`, as the scene has it, in the frame of the left camera: half a baseline left of the middle.
+/// Height above the floor of `repetitive` in the left camera's frame, half a baseline left of the scene's centre.
 fn above_the_floor([_, y, z]: [f64; 3]) -> f64 {
     (0.6 - y) - 0.1 * (z - 1.2)
 }
 
 #[test]
-fn points_of_a_plane_lie_in_it() {
+fn points_of_a_plane_are_coplanar() {
     let folder = Folder::new();
     matched(&folder, "repetitive", "d.pfm --also points --quiet");
     let truth = read_pfm(scene("repetitive/disp0GT.pfm"));
@@ -194,5 +194,5 @@ fn points_of_a_plane_lie_in_it() {
     let off = median(on_floor.iter().map(|p| above_the_floor(*p).abs()).collect());
     assert!(off < 0.01, "{off} world units above or below the floor");
     let flipped = median(on_floor.iter().map(|p| above_the_floor([p[0], -p[1], p[2]]).abs()).collect());
-    assert!(flipped > 0.5, "the check sees a frame with y up: {flipped}");
+    assert!(flipped > 0.5, "the check detects a frame with y up: {flipped}");
 }

@@ -1,5 +1,5 @@
-//! `mrfgs sequence` of recordings: the maps are those of `match`, and what is written holds them. The messages are laid out and taken
-//! apart here by hand.
+//! `mrfgs sequence` with recordings: the maps equal those of `match`, and written recordings contain them. Messages are serialized and
+//! parsed independently here.
 
 use std::io::Read;
 
@@ -20,7 +20,7 @@ fn frame(scene_name: &str, view: usize) -> image::RgbImage {
     image.crop_imm(90, 70, SIZE.0, SIZE.1).to_rgb8()
 }
 
-/// A message as ROS 2 lays it out; each number stands at a multiple of its size.
+/// A message in ROS 2's serialization; each number is aligned to its size.
 struct Bytes(Vec<u8>);
 
 impl Bytes {
@@ -28,7 +28,7 @@ impl Bytes {
         Self(vec![0, 1, 0, 0]).header(stamp, frame_id)
     }
 
-    /// A message within a message has its own header.
+    /// A nested message has its own header.
     fn with_header_again(self, stamp: u64) -> Self {
         self.header(stamp, "camera")
     }
@@ -71,7 +71,7 @@ fn image_message(stamp: u64, image: &image::RgbImage) -> Vec<u8> {
     message.u32(3 * width).u32(image.as_raw().len() as u32).bytes(image.as_raw()).0
 }
 
-/// Two cameras alike, 0.2 m apart: lens, rotation and projection are those of `camera_file`.
+/// Two equal cameras, 0.2 m apart, with lens, rotation and projection as in `camera_file`.
 fn camera_info(view: usize, (width, height): (u32, u32)) -> Vec<u8> {
     let (k, d, r, p) = camera(view, (width, height));
     let message = Bytes::with_header(0, "camera").u32(height).u32(width).text("plumb_bob").u32(5);
@@ -88,7 +88,7 @@ fn camera(view: usize, (width, height): (u32, u32)) -> Camera {
     (k, [-0.1, 0.02, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], p)
 }
 
-/// As `camera_calibration` saves it.
+/// As saved by `camera_calibration`.
 fn camera_file(view: usize) -> String {
     let (k, d, r, p) = camera(view, SIZE);
     let matrix = |name: &str, (rows, cols): (usize, usize), data: &[f64]| {
@@ -126,7 +126,7 @@ fn cameras(size: (u32, u32)) -> Vec<Message> {
     ["left", "right"].into_iter().enumerate().map(info).collect()
 }
 
-/// Writes them by the crate of MCAP, in chunks of one or two images.
+/// Writes the messages with the mcap crate, in chunks of one or two images.
 fn record(path: &Path, messages: &[Message]) {
     let options = mcap::WriteOptions::new().profile("ros2").chunk_size(Some(12_000)).compression(None);
     let mut writer = options.create(std::io::BufWriter::new(fs::File::create(path).unwrap())).unwrap();
@@ -140,7 +140,7 @@ fn record(path: &Path, messages: &[Message]) {
     writer.finish().unwrap();
 }
 
-/// Writes a recording of three frames of 320 x 240, rectified.
+/// Writes a recording of three rectified frames of 320 x 240.
 pub(super) fn record_drive(path: &Path) {
     let mut messages = cameras((320, 240));
     for n in 0..3 {
@@ -155,7 +155,7 @@ pub(super) fn record_drive(path: &Path) {
 
 const NAMES: [&str; 3] = ["1700000000.000000000", "1700000000.050000000", "1700000000.100000000"];
 
-/// What `match` writes for each scene: the files that end so.
+/// The files that `match` writes for each scene, selected by their endings.
 fn wanted(folder: &Path, ends: &[&str], flags: &str) -> Vec<Vec<Vec<u8>>> {
     let outside = Folder::new();
     for view in [0, 1] {
@@ -192,7 +192,7 @@ fn recordings_give_the_maps_of_match() {
     run_it("", "maps").succeeded().says("3 frames of 64 x 48, 24 labels");
     assert_eq!(found(&folder.join("maps"), &["pfm"]), wanted);
     assert_eq!(listing(&folder.join("maps")).len(), 3);
-    // In any order, under other names, and not triggered together.
+    // In any order, with other names, and not triggered simultaneously.
     let mut messages = images("image_rect", 0);
     messages.sort_by_key(|(topic, ..)| std::cmp::Reverse(topic.clone()));
     messages.rotate_left(1);
@@ -204,18 +204,18 @@ fn recordings_give_the_maps_of_match() {
     run_it("--quiet --tolerance 0.0019", "never").failed(1, "--tolerance");
     run_it("--quiet --tolerance 0.002", "near").succeeded();
     assert_eq!(found(&folder.join("near"), &["pfm"]), wanted);
-    // Control: exchanged topics are another pair.
+    // Control: swapped topics give other maps.
     run_it("--quiet --tolerance 0.002 --topics right/image_rect,left/image_rect", "swapped").succeeded();
     let swapped = fs::read_dir(folder.join("swapped")).unwrap().next().unwrap().unwrap().path();
     assert!(wanted.iter().flatten().all(|map| *map != fs::read(&swapped).unwrap()));
-    // What has no partner is left out, and counted.
+    // Images without a partner are skipped and counted.
     let mut messages = images("image_rect", 0);
     messages.remove(3);
     messages.push(messages[0].clone());
     record(&path, &messages);
     run_it("", "gaps")
         .succeeded()
-        .says("1 left and 0 right images had no partner, 1 image had the time of another one");
+        .says("1 left and 0 right images had no partner, 1 image had the same time as another one");
     assert_eq!(listing(&folder.join("gaps")).len(), 2);
     // The folder of a recording in two files.
     fs::create_dir(folder.join("bag")).unwrap();
@@ -228,7 +228,7 @@ fn recordings_give_the_maps_of_match() {
     assert_eq!(found(&folder.join("of-bag"), &["pfm"]), wanted);
 }
 
-/// The calibration in a recording does what ROS's own files do.
+/// The calibration in a recording is equivalent to ROS's own files.
 #[test]
 fn calibrations_in_recordings_are_those_of_files() {
     let folder = Folder::new();
@@ -249,13 +249,13 @@ fn calibrations_in_recordings_are_those_of_files() {
         text.contains("\"rectified\":true") && text.contains("\"frame\":\"1700000000.050000000\""),
         "{text}"
     );
-    // Rectified images take the cameras, but are not rectified.
+    // Rectified images use the cameras without being rectified again.
     record(&path, &[cameras(SIZE), images("image_rect", 0)].concat());
     run(&folder, &format!("sequence drive.mcap rect {RANGE} --quiet --also depth")).succeeded();
     let of_rect = wanted(&folder, &["pfm", "depth.pfm"], "--calib 0.yaml --calib 1.yaml --also depth");
     assert_eq!(found(&folder.join("rect"), &["pfm", "depth.pfm"]), of_rect);
     assert_ne!(of_rect[0][0], of_files[0][0], "control: unrectified images are another pair");
-    // The user's own calibration counts more.
+    // The user's own calibration takes precedence.
     let calib = "cam0=[60 0 32; 0 60 24; 0 0 1]\ndoffs=0\nbaseline=400\nunit=mm\n";
     fs::write(folder.join("calib.txt"), calib).unwrap();
     let line = format!("sequence drive.mcap own {RANGE} --quiet --also depth --calib calib.txt");
@@ -271,7 +271,7 @@ fn calibrations_in_recordings_are_those_of_files() {
 /// The messages of a topic: times and bytes.
 pub(super) fn messages(path: &Path, topic: &str) -> Vec<(u64, Vec<u8>)> {
     let bytes = fs::read(path).unwrap();
-    // Chunks are packed by LZ4, for which the crate of MCAP would take C.
+    // Chunks are compressed by LZ4, for which the mcap crate would need a C library.
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     let channel = summary.channels.values().find(|channel| channel.topic == topic).unwrap();
     let mut found = Vec::new();
@@ -292,7 +292,7 @@ pub(super) fn messages(path: &Path, topic: &str) -> Vec<(u64, Vec<u8>)> {
 }
 
 #[test]
-fn what_is_written_holds_what_match_finds() {
+fn recordings_contain_the_results_of_match() {
     let folder = Folder::new();
     record(&folder.join("drive.mcap"), &[cameras(SIZE), images("image_rect", 0)].concat());
     let also = "--also depth,depth-mm,confidence,sigma";
@@ -338,7 +338,7 @@ fn what_is_written_holds_what_match_finds() {
     }
     let disparity = all("/disparity");
     assert!(disparity.len() == 3 && disparity[0].1[4..] != disparity[1].1[4..], "control: all frames differ");
-    // Of a folder of images, whose names are their times.
+    // For a folder of images whose names are times.
     for (view, side) in ["left", "right"].into_iter().enumerate() {
         fs::create_dir(folder.join(side)).unwrap();
         for (scene, name) in SCENES.iter().zip(NAMES) {
@@ -387,15 +387,15 @@ fn depths_of_a_third_camera_are_written() {
         let info = (0..6).fold(lens, |all, _| all.u32(0)).bytes(&[0]).0;
         assert!(all("camera_info")[n] == (stamp, info), "frame {n}");
     }
-    // Control: a camera that stands elsewhere sees other depths.
+    // Control: another position of the camera gives other depths.
     fs::write(&file, third.replace("0.05", "0.06")).unwrap();
     run(&folder, &format!("sequence drive.mcap moved.mcap {RANGE} --quiet {also}")).succeeded();
     assert_ne!(messages(&folder.join("moved.mcap"), "/depth_registered/image"), all("image"));
 }
 
-/// The first calibration counts, and a later one that differs is told.
+/// The first calibration is used, and a later change is reported.
 #[test]
-fn a_calibration_that_changes_is_told() {
+fn a_changing_calibration_is_reported() {
     let folder = Folder::new();
     let path = folder.join("drive.mcap");
     let line = format!("sequence drive.mcap maps {RANGE} --also depth");
@@ -410,12 +410,12 @@ fn a_calibration_that_changes_is_told() {
     record(&path, &messages);
     run(&folder, &line)
         .succeeded()
-        .says("the calibration on /left/camera_info changes at 0.000000000 & by the first one");
+        .says("the calibration on /left/camera_info changes at 0.000000000 & with the first one");
 }
 
-/// What is wrong with a recording is told in one line, and whole frames stay.
+/// Faulty recordings give one line, and complete frames are kept.
 #[test]
-fn recordings_that_are_wrong_are_told_in_one_line() {
+fn faulty_recordings_are_reported_in_one_line() {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
     let good = images("image_rect", 0);
@@ -436,7 +436,7 @@ fn recordings_that_are_wrong_are_told_in_one_line() {
         &at("encoding.mcap"),
         &changed(last.windows(4).position(|word| word == b"rgb8").unwrap(), b"abc9"),
     );
-    // Height and width stand behind the name of the camera.
+    // Height and width follow the frame name of the camera.
     record(&at("huge.mcap"), &changed(24, &[0xff; 8]));
     record(&at("short.mcap"), &changed(24, &100_u32.to_le_bytes()));
     record(&at("cut-message.mcap"), &with_last(last[..100].to_vec()));
@@ -465,9 +465,9 @@ fn recordings_that_are_wrong_are_told_in_one_line() {
     for (line, code, done, words) in [
         ("none.mcap OUT", 1, 0, "none.mcap & no such file"),
         ("empty.mcap OUT", 1, 0, "empty.mcap: is empty"),
-        ("words.mcap OUT", 1, 0, "words.mcap: is no MCAP file"),
-        ("words.bag OUT", 1, 0, "words.bag: is no bag of ROS 1"),
-        ("a.db3 OUT", 1, 0, "a.db3 & no database of SQLite"),
+        ("words.mcap OUT", 1, 0, "words.mcap: is not an MCAP file"),
+        ("words.bag OUT", 1, 0, "words.bag: is not a ROS 1 bag"),
+        ("a.db3 OUT", 1, 0, "a.db3 & not an SQLite database"),
         ("cut.mcap OUT", 1, 1, "cut.mcap: is cut off"),
         ("flipped.mcap OUT", 1, 2, "flipped.mcap: the chunk at byte & checksum"),
         ("encoding.mcap OUT", 1, 2, "encoding.mcap:/left/image_rect at 1700000000.100000000 & `abc9`"),
@@ -482,11 +482,11 @@ fn recordings_that_are_wrong_are_told_in_one_line() {
         ("good.mcap OUT --topics /a,/b", 1, 0, "has no topic /a & /left/image_rect, /right/image_rect"),
         ("good.mcap OUT --topics /a", 2, 0, "--topics & left"),
         ("good.mcap OUT --tolerance -1", 2, 0, "--tolerance & from 0"),
-        ("good.mcap OUT --max-pixels 100", 1, 0, "64 x 48 pixels and at most 100"),
-        ("good.mcap good.mcap OUT", 2, 0, "RIGHT & holds both views"),
-        ("good.mcap OUT --pairing order", 2, 0, "--pairing & two topics"),
+        ("good.mcap OUT --max-pixels 100", 1, 0, "64 x 48 pixels, but at most 100"),
+        ("good.mcap good.mcap OUT", 2, 0, "RIGHT & contains both views"),
+        ("good.mcap OUT --pairing order", 2, 0, "--pairing & both views"),
         ("good.mcap OUT --also depth", 2, 0, "--also depth & /left/camera_info"),
-        ("good.mcap found.mcap --also preview", 2, 0, "--also preview & no message"),
+        ("good.mcap found.mcap --also preview", 2, 0, "--also preview & ROS message"),
         ("good.mcap found.mcap --format tif", 2, 0, "--format & recording"),
         ("good.mcap good.mcap", 2, 0, "OUTPUT & already"),
     ] {
@@ -505,15 +505,15 @@ fn recordings_that_are_wrong_are_told_in_one_line() {
     }
     fs::create_dir(at("left")).unwrap();
     frame("thin", 0).save(at("left/1.png")).unwrap();
-    run(&folder, "sequence left left maps --tolerance 1").failed(2, "--tolerance & LEFT is none");
+    run(&folder, "sequence left left maps --tolerance 1").failed(2, "--tolerance & LEFT is not one");
 }
 
-/// Images without times in their headers are refused, however many there are; one that begins at 0 has times.
+/// Recordings without times in the headers are refused, of any length; one that starts at time 0 is accepted.
 #[test]
 fn images_without_times_are_refused() {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
-    // Seconds and nanoseconds stand behind the first four bytes.
+    // Seconds and nanoseconds follow the first four bytes.
     let at_zero = |message: &Message| {
         let mut message = message.clone();
         message.2[4..12].fill(0);
@@ -525,7 +525,7 @@ fn images_without_times_are_refused() {
         record(&at("untimed.mcap"), &untimed);
         run(&folder, &format!("sequence untimed.mcap maps {RANGE}")).failed(
             1,
-            "untimed.mcap: the images on /left/image_rect have no time in their headers & record again",
+            "untimed.mcap: images are paired by the time in their headers, but on /left/image_rect that is 0 & record again",
         );
         assert!(!at("maps").exists(), "{count}");
     }
@@ -535,9 +535,9 @@ fn images_without_times_are_refused() {
     assert_eq!(listing(&at("maps")).len(), 3);
 }
 
-/// A part of a bag that its metadata names, and messages that it counts, are missed.
+/// Missing files and messages that the metadata lists are reported.
 #[test]
-fn what_a_bag_lacks_is_told() {
+fn missing_parts_of_a_bag_are_reported() {
     let folder = Folder::new();
     let bag = folder.join("bag");
     fs::create_dir(&bag).unwrap();
@@ -552,12 +552,12 @@ fn what_a_bag_lacks_is_told() {
     record(&bag.join("bag_0.mcap"), &good[..2]);
     metadata(&["bag_0.mcap", "bag_1.mcap"], 4);
     run(&folder, &format!("sequence bag maps {RANGE}"))
-        .failed(1, "bag_1.mcap: there is no such file, though metadata.yaml names it & take its line out");
+        .failed(1, "bag_1.mcap: there is no such file, but metadata.yaml lists it & remove its line");
     assert!(!folder.join("maps").exists());
     metadata(&["bag_0.mcap"], 4);
     let told = run(&folder, &format!("sequence bag maps {RANGE}")).succeeded();
-    told.says("the recording holds 2 messages, and 4 by its metadata.yaml");
-    // Control: all is there.
+    told.says("the recording contains 2 messages, but its metadata.yaml says 4");
+    // Control: the complete bag.
     record(&bag.join("bag_1.mcap"), &good[2..4]);
     metadata(&["bag_0.mcap", "bag_1.mcap"], 4);
     let said = run(&folder, &format!("sequence bag whole {RANGE}")).succeeded().stderr;
@@ -565,16 +565,16 @@ fn what_a_bag_lacks_is_told() {
     assert_eq!(listing(&folder.join("whole")).len(), 2);
 }
 
-/// The first damaged image of each camera is named, and no other; its frame is matched.
+/// Only the first damaged image of each camera is reported, and its frame is still matched.
 #[test]
-fn damaged_images_in_recordings_are_named_once() {
+fn damaged_images_in_recordings_are_reported_once() {
     let folder = Folder::new();
     let compressed = |stamp: u64, image: &image::RgbImage, damaged: bool| {
         let mut file = std::io::Cursor::new(Vec::new());
         image.write_to(&mut file, image::ImageFormat::Jpeg).unwrap();
         let whole = file.into_inner();
         let length = whole.len();
-        // Some bytes less: a part of the pixels is missing. It depends on the image without which bytes its decoder goes on.
+        // Removing bytes drops some pixels. Which bytes the decoder can do without depends on the image.
         let without = |end: usize| [&whole[..end], &whole[end + 60..]].concat();
         let is_read = |file: &Vec<u8>| Reader::default().raster_in_memory("a.jpg".as_ref(), file).is_ok();
         let file =
@@ -604,13 +604,13 @@ fn damaged_images_in_recordings_are_named_once() {
     assert_eq!(said, "");
 }
 
-/// What cameras of robots send: luma and chroma give the map of the colours that they stand for.
+/// Luma and chroma, as robot cameras send them, give the map of the equivalent colours.
 #[test]
 fn images_in_luma_and_chroma_are_matched() {
     let folder = Folder::new();
     let all = images("image_rect", 0);
     let pixels = 3 * (SIZE.0 * SIZE.1) as usize;
-    // Luma of 16 to 235 is grey, and chroma of 128 is none.
+    // Luma of 16 to 235 is grey; chroma of 128 is neutral.
     let luma = |message: &Message| -> Vec<u8> {
         let rgb = &message.2[message.2.len() - pixels..];
         rgb.chunks_exact(3).map(|p| 16 + (u32::from(p[1]) * 219 / 255) as u8).collect()

@@ -5,7 +5,7 @@ use super::*;
 const MATCH: &str = "match @raw/left.png @raw/right.png";
 const RECTIFY: &str = "--rectify --calib @raw/cameras.yml --device cpu --quiet";
 
-/// The third camera of `testdata/raw` in the forms of other programs, by numbers of its file.
+/// The third camera of `testdata/raw` in the formats of other programs, with the numbers of its file.
 fn forms() -> [(&'static str, String); 4] {
     let text = fs::read_to_string(scene("raw/third.yml")).unwrap();
     let numbers = |name: &str| -> Vec<f64> {
@@ -18,7 +18,7 @@ fn forms() -> [(&'static str, String); 4] {
         let row = |i: usize| vec![r[3 * i], r[3 * i + 1], r[3 * i + 2], scale * t[i]];
         (0..3).map(row).chain([vec![0.0, 0.0, 0.0, 1.0]]).collect()
     };
-    // The first camera beyond the left one stands in its place.
+    // The first camera after the left one stands for the right camera.
     let kalibr = format!(
         "cam0: {{camera_model: pinhole}}\ncam1:\n  T_cn_cnm1: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n\
          cam2:\n  camera_model: pinhole\n  distortion_model: radtan\n  distortion_coeffs: {:?}\n  intrinsics: {:?}\n  \
@@ -54,7 +54,7 @@ fn forms() -> [(&'static str, String); 4] {
 }
 
 #[test]
-fn depths_go_into_a_third_camera_by_files_of_several_forms() {
+fn depths_are_registered_with_files_of_several_formats() {
     let folder = Folder::new();
     let mut first: Option<Plane<f32>> = None;
     for (name, text) in forms() {
@@ -72,7 +72,7 @@ fn depths_go_into_a_third_camera_by_files_of_several_forms() {
             assert_eq!(whole[0], expected as u16, "{name}");
         }
         let first = first.get_or_insert_with(|| depths.clone());
-        // Other units round the numbers of the pose.
+        // Other units round the pose.
         for (a, b) in depths.data().iter().zip(first.data()) {
             let same = (!a.is_finite() && !b.is_finite()) || (a - b).abs() < 1e-5 * b;
             assert!(same, "{name}: {a} and {b}");
@@ -81,7 +81,7 @@ fn depths_go_into_a_third_camera_by_files_of_several_forms() {
 }
 
 #[test]
-fn a_map_that_is_there_gives_the_same_depths() {
+fn an_existing_map_gives_the_same_depths() {
     let folder = Folder::new();
     let also = "--also depth-registered --into @raw/third.yml";
     let matched =
@@ -90,7 +90,7 @@ fn a_map_that_is_there_gives_the_same_depths() {
     let depths = fs::read(folder.join("d.depth-registered.pfm")).unwrap();
     run(&folder, &format!("depth d.pfm e.pfm --calib @mixed/calib.txt {also} --quiet")).succeeded();
     assert!(fs::read(folder.join("e.depth-registered.pfm")).unwrap() == depths);
-    // What is not sure, or too far, is left out there too.
+    // Uncertain and distant pixels are dropped there, too.
     run(&folder, &format!("depth d.pfm f.pfm --calib @mixed/calib.txt {also} --quiet --clip-depth 2"))
         .succeeded();
     let near = read_pfm(folder.join("f.depth-registered.pfm"));
@@ -113,7 +113,7 @@ fn a_batch_and_a_sequence_take_a_third_camera() {
     run(&folder, line).succeeded();
     let first = fs::read(folder.join("out/a.depth-registered.pfm")).unwrap();
     run(&folder, line).succeeded().says("1 skipped");
-    // Another camera asks for other maps.
+    // Another camera invalidates the maps.
     into(1000.0);
     run(&folder, line).succeeded();
     assert!(fs::read(folder.join("out/a.depth-registered.pfm")).unwrap() != first);
@@ -128,7 +128,7 @@ fn a_batch_and_a_sequence_take_a_third_camera() {
 }
 
 #[test]
-fn cameras_that_make_no_sense_are_refused() {
+fn invalid_cameras_are_refused() {
     let folder = Folder::new();
     let good = "K: [100, 0, 60, 0, 100, 40, 0, 0, 1]\nD: [0, 0, 0, 0]\nR: [0, 0, 0]\nT: [0, 0, 0]\nsize: [120, 80]\n";
     let line = format!("{MATCH} d.pfm {RECTIFY} --also depth-registered --into t.yml");
@@ -154,8 +154,7 @@ fn cameras_that_make_no_sense_are_refused() {
     fs::write(folder.join("t.yml"), good).unwrap();
     let flagged = |also: &str| format!("{MATCH} d.pfm {RECTIFY} {also}");
     run(&folder, &flagged("--also depth --into t.yml")).failed(2, "--into & add one of them");
-    run(&folder, &flagged("--also depth-registered"))
-        .failed(2, "--also depth-registered & give that by --into");
+    run(&folder, &flagged("--also depth-registered")).failed(2, "--also depth-registered & add --into FILE");
     run(&folder, &flagged("--also depth-registered --into none.yml")).failed(1, "none.yml");
     let line = format!("{MATCH} t.yml.pfm {RECTIFY} --also depth-registered --into t.yml.pfm");
     fs::write(folder.join("t.yml.pfm"), good).unwrap();

@@ -13,11 +13,11 @@ fn attributes<'a>(page: &'a str, name: &str) -> Vec<&'a str> {
 }
 
 #[test]
-fn a_report_is_whole_and_stands_alone() {
+fn a_report_is_complete_and_self_contained() {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
     copy("slanted", &at("Teddy"));
-    // What a name of a folder may hold.
+    // Characters that folder names may contain.
     let odd = if cfg!(windows) { "a & 'b'" } else { "<b>\"a\" & 'b'" };
     copy("mixed", &at(odd));
     let line = "evaluate Teddy --report out --json out.json";
@@ -49,7 +49,7 @@ fn a_report_is_whole_and_stands_alone() {
         assert_eq!(fs::read(at("out").join(file)).unwrap(), bytes, "{file}");
         let picture = image::load_from_memory(&bytes).unwrap();
         let (w, h) = if file.starts_with("1-Teddy-") { (240, 180) } else { (320, 240) };
-        // Below the map: nothing, the scale (16 rows), or one line of classes (9 rows).
+        // Below the map: nothing, the colour bar (16 rows), or one line of classes (9 rows).
         let legend = match file.rsplit('-').next().unwrap() {
             "left.png" | "zones.png" => 0,
             "validity.png" => 9,
@@ -58,11 +58,11 @@ fn a_report_is_whole_and_stands_alone() {
         assert_eq!((picture.width(), picture.height()), (w, h + legend), "{file}");
     }
     assert_eq!(fs::read_dir(at("out")).unwrap().count(), 15);
-    // The left view is the left view.
+    // The left view is unchanged.
     let left = image::open(at("out/1-Teddy-left.png")).unwrap().into_rgb8();
     assert_eq!(left, image::open(at("Teddy/im0.png")).unwrap().into_rgb8());
 
-    // A later report takes its place; a map that others made has fewer pictures.
+    // A later report replaces it; a finished map has fewer pictures.
     evaluated(&folder, "map Teddy/disp0GT.pfm --truth Teddy/disp0GT.pfm --report out");
     let mut names: Vec<_> =
         fs::read_dir(at("out")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
@@ -70,14 +70,14 @@ fn a_report_is_whole_and_stands_alone() {
     let pictures = ["disparity", "error", "truth"].map(|name| format!("1-disp0GT-{name}.png"));
     assert_eq!(names, [&pictures[..], &["index.html".into()]].concat());
     let error = image::open(at("out/1-disp0GT-error.png")).unwrap().into_rgb8();
-    assert!((0..180).all(|y| error.get_pixel(100, y).0 == [250; 3]), "no error is white");
+    assert!((0..180).all(|y| error.get_pixel(100, y).0 == [250; 3]), "zero error is white");
 
-    // Nothing temporary is left.
+    // No temporary files are left.
     assert_eq!(fs::read_dir(&*folder).unwrap().count(), 4);
 }
 
 #[test]
-fn a_report_that_cannot_be_leaves_nothing() {
+fn a_failed_report_leaves_nothing() {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
     copy("slanted", &at("Teddy"));
@@ -88,13 +88,13 @@ fn a_report_that_cannot_be_leaves_nothing() {
     }
     fs::copy(scene("mixed/disp0GT.pfm"), at("misfit/disp0GT.pfm")).unwrap();
 
-    // The folder itself.
-    refused(&folder, "Teddy --report Teddy", 1, "Teddy & no part of an earlier report");
+    // Faults of the folder.
+    refused(&folder, "Teddy --report Teddy", 1, "Teddy & not part of an earlier report");
     refused(&folder, "Teddy --report none/out", 1, "none/out & create it first");
     refused(&folder, "Teddy --report Teddy/im0.png", 1, "im0.png & is a file");
-    refused(&folder, "Teddy --report empty --json empty/a.json", 2, "--json & empty/a.json & another name");
+    refused(&folder, "Teddy --report empty --json empty/a.json", 2, "--json & empty/a.json & another path");
 
-    // What fails later: the second pair, or the JSON.
+    // Later failures: the second pair, or the JSON.
     for out in ["out", "empty"] {
         refused(&folder, &format!("misfit --report {out}"), 1, "disp0GT.pfm is 320 x 240");
     }
@@ -103,7 +103,7 @@ fn a_report_that_cannot_be_leaves_nothing() {
         refused(&folder, &format!("{line} --report out --json /dev/full"), 1, "/dev/full");
     }
 
-    // A report with something else in it stays, and so does a page that is none.
+    // A report with other files in it is kept, and so is another web page.
     evaluated(&folder, &format!("{line} --report empty"));
     fs::write(at("empty/notes.txt"), "precious").unwrap();
     refused(&folder, &format!("{line} --report empty"), 1, "empty & notes.txt & new folder");

@@ -1,4 +1,4 @@
-//! `scripts/results`: its tables have the figures of `mrfgs evaluate`, and stand in the documents.
+//! `scripts/results`: its tables agree with `mrfgs evaluate`, and are in the documents.
 
 #![cfg(unix)]
 
@@ -16,8 +16,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// A folder with a copy of the script and of its documents, and a pair called Teddy, a part of a scene to be
-/// quick.
+/// A folder with copies of the script and its documents, and a small pair called Teddy, cropped from a scene.
 fn workshop() -> Folder {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
@@ -40,7 +39,7 @@ fn workshop() -> Folder {
     folder
 }
 
-/// Runs the copy of the script with this program: whether it succeeded, and what it printed, complaints last.
+/// Runs the copied script with this program. Returns whether it succeeded, and its output followed by its errors.
 fn results(folder: &Path, program: &Path, args: &str) -> (bool, String) {
     let ran = Command::new("python3")
         .arg("scripts/results")
@@ -60,7 +59,7 @@ fn printed(folder: &Path, args: &str) -> String {
     text
 }
 
-/// The cells of the row that begins with `name`.
+/// The cells of the row that starts with `name`.
 fn row<'a>(table: &'a str, name: &str) -> Vec<&'a str> {
     let start = format!("| {name} |");
     let line = table.lines().find(|line| line.starts_with(&start));
@@ -68,7 +67,7 @@ fn row<'a>(table: &'a str, name: &str) -> Vec<&'a str> {
     line.trim_matches('|').split('|').map(str::trim).collect()
 }
 
-/// What `mrfgs evaluate` says of the pair, with these decimals: of the raw or the final map, by keys.
+/// The figures of `mrfgs evaluate` for the pair, with these decimals: of the raw or the final map, by keys.
 fn figures(folder: &Path, flags: &str, map: &str, keys: &[(&str, usize)]) -> Vec<String> {
     let found = evaluated(folder, &format!("Teddy --json - {flags}")).json();
     let all = &found["mean"][map]["all"];
@@ -76,7 +75,7 @@ fn figures(folder: &Path, flags: &str, map: &str, keys: &[(&str, usize)]) -> Vec
 }
 
 #[test]
-fn every_table_stands_in_a_document() {
+fn every_table_is_in_a_document() {
     let folder = workshop();
     let listed = printed(&folder, "--list");
     let listed: BTreeSet<_> = listed.lines().map(|line| line.split(' ').next().unwrap()).collect();
@@ -90,7 +89,7 @@ fn every_table_stands_in_a_document() {
 }
 
 #[test]
-fn rows_are_what_evaluate_says() {
+fn rows_agree_with_evaluate() {
     let folder = workshop();
     let parts = printed(&folder, "ablations Teddy");
     let keys = [("avg", 3), ("bad0.5", 2), ("bad2.0", 2)];
@@ -112,7 +111,7 @@ fn rows_are_what_evaluate_says() {
 }
 
 #[test]
-fn the_papers_figures_stand_beside_ours() {
+fn the_papers_figures_are_shown_beside_ours() {
     let folder = workshop();
     let text = printed(&folder, "paper-raw paper-gains Teddy");
     let keys = [("avg", 2), ("psnr", 2), ("bad2.0", 2)];
@@ -126,7 +125,7 @@ fn the_papers_figures_stand_beside_ours() {
 }
 
 #[test]
-fn a_table_replaces_that_of_its_name_alone() {
+fn only_the_named_table_is_replaced() {
     let folder = workshop();
     let before = DOCUMENTS.map(|file| fs::read_to_string(folder.join(file)).unwrap());
     let text = printed(&folder, "--write accuracy Teddy");
@@ -145,7 +144,7 @@ fn a_table_replaces_that_of_its_name_alone() {
 }
 
 #[test]
-fn what_makes_no_table_is_refused() {
+fn invalid_arguments_are_refused() {
     let folder = workshop();
     let program = Path::new(env!("CARGO_BIN_EXE_mrfgs"));
     for (args, words) in [
@@ -156,7 +155,7 @@ fn what_makes_no_table_is_refused() {
         let (succeeded, text) = results(&folder, program, args);
         assert!(!succeeded && text.contains(words), "{args}: {text}");
     }
-    // A program that does not do what --set says.
+    // A program that ignores --set.
     let deaf = folder.join("deaf");
     let script = format!(
         "#!/bin/sh\nfor word; do shift; [ \"$word\" = --set ] && skip=1 && continue\n\
@@ -167,7 +166,7 @@ fn what_makes_no_table_is_refused() {
     fs::set_permissions(&deaf, fs::Permissions::from_mode(0o755)).unwrap();
     let (succeeded, text) = results(&folder, &deaf, "ablations Teddy");
     assert!(!succeeded && text.contains("level-rows=false: it is the same method as default"), "{text}");
-    // And one that fails.
+    // A program that fails.
     let (succeeded, text) = results(&folder, Path::new("false"), "accuracy Teddy");
     assert!(!succeeded && text.contains("false ended with 1"), "{text}");
 }

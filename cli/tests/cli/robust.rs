@@ -1,8 +1,8 @@
-//! What ends a run from outside: too little memory, a full disk, a signal; and what the outputs are then.
+//! Runs ended from outside by too little memory, a full disk or a signal, and the state of their outputs.
 
 use super::*;
 
-/// Whatever the limit, a match ends well or says in one line that there is not enough; no allocation aborts.
+/// Under any limit, a match either succeeds or reports too little memory in one line; no allocation aborts.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_limit_of_memory_aborts() {
@@ -25,7 +25,7 @@ fn no_limit_of_memory_aborts() {
         let line = format!(
             "match im0.png.{ending} im1.png.{ending} out.pfm --device cpu --threads 1 --quiet {options}"
         );
-        // The program itself takes some 60 MiB of addresses.
+        // The program itself needs about 60 MiB of address space.
         let enough = (80..1024).step_by(40).find(|limit| {
             let told = shell(&folder, &format!("ulimit -v {}", limit << 10), &line);
             let enough = told.code == Some(0);
@@ -44,13 +44,13 @@ fn no_limit_of_memory_aborts() {
     assert!(refused > 7, "control: the limits are limits: {refused}");
 }
 
-/// A file that grows no further is told by its own name.
+/// A file that reaches its size limit is reported by its own name.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_is_told_with_the_name_of_the_output() {
+fn a_full_disk_is_reported_with_the_name_of_the_output() {
     let folder = workshop();
     let before = listing(&folder);
-    // A file may have 4 KiB here, and the signal that says so is ignored or not.
+    // Files are limited to 4 KiB, with the signal ignored or not.
     let limits = ["trap '' XFSZ; ulimit -f 8", "ulimit -f 8"];
     for (n, (line, name)) in [
         ("match left.png right.png out.pfm --max-disparity 9", "cannot write out.pfm: File too large"),
@@ -91,7 +91,7 @@ fn killed(folder: &Path, after: Duration, line: &str) {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_killed_match_leaves_nothing_half_written() {
+fn a_killed_match_leaves_no_incomplete_file() {
     let folder = workshop();
     let before = listing(&folder);
     let line = "match left.png right.png out.pfm --max-disparity 9 --device cpu --also raw,confidence";
@@ -115,11 +115,11 @@ fn a_killed_match_leaves_nothing_half_written() {
 
 #[cfg(unix)]
 #[test]
-fn what_a_killed_match_leaves_of_a_folder_is_gone_with_the_next_run() {
+fn the_next_run_removes_the_remains_of_a_killed_one() {
     let folder = workshop();
     let before = listing(&folder);
     let line = "inspect left.png right.png steps --max-disparity 9 --device cpu";
-    // As a run leaves it that is killed on its way.
+    // Remains of a killed run.
     let staging = folder.join(".steps.tmp");
     fs::create_dir_all(staging.join("new")).unwrap();
     fs::write(staging.join("new/half.png"), "half").unwrap();
@@ -127,7 +127,7 @@ fn what_a_killed_match_leaves_of_a_folder_is_gone_with_the_next_run() {
     run(&folder, line).succeeded();
     assert!(!staging.exists() && folder.join("steps/change-per-iteration.csv").exists());
     assert!(!folder.join("steps/half.png").exists());
-    // One that runs is left alone.
+    // A running one is left alone.
     fs::remove_dir_all(folder.join("steps")).unwrap();
     fs::create_dir(&staging).unwrap();
     let lock = fs::File::create(staging.join("lock")).unwrap();
@@ -138,7 +138,7 @@ fn what_a_killed_match_leaves_of_a_folder_is_gone_with_the_next_run() {
     assert!(listing(&folder) == before);
 }
 
-/// A link as output stays a link, and what it leads to is written, there already or not.
+/// If the output is a link, its target is written, existing or not.
 #[cfg(unix)]
 #[test]
 fn links_are_followed_everywhere() {
@@ -157,10 +157,10 @@ fn links_are_followed_everywhere() {
         assert!(fs::read(at("below/map.pfm")).unwrap().starts_with(b"Pf\n"));
         assert!(fs::read(at("below/picture.png")).unwrap().starts_with(b"\x89PNG"));
     }
-    // An input is one by whatever name.
+    // Inputs are recognised behind links.
     symlink("left.png", at("other.png")).unwrap();
     run(&folder, "match left.png right.png other.png --max-disparity 9")
-        .failed(2, "other.png is LEFT already");
+        .failed(2, "other.png is already LEFT");
 
     fs::create_dir(at("maps")).unwrap();
     fs::write(at("list.csv"), "name,left,right,max_disparity\na,left.png,right.png,9\n").unwrap();

@@ -1,5 +1,4 @@
-//! `mrfgs sequence`: whatever the frames come in, the maps are those of `match`; and whatever ends a sequence early, what was done
-//! before stays.
+//! `mrfgs sequence`: for every source of frames the maps equal those of `match`, and after an early end all finished frames are kept.
 
 use std::io::Read;
 
@@ -15,7 +14,7 @@ fn frame(scene_name: &str, view: usize) -> image::RgbImage {
     image.crop_imm(90, 70, SIZE.0, SIZE.1).to_rgb8()
 }
 
-/// A folder with the frames of both cameras, and of both in one.
+/// A folder with the frames of both cameras, separately and combined.
 fn cameras() -> Folder {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
@@ -60,12 +59,12 @@ fn maps(folder: &Path, names: [&str; 3]) -> Vec<Vec<u8>> {
 /// Runs the program with `bytes` on standard input.
 fn fed(folder: &Path, line: &str, bytes: &[u8]) -> Output {
     let mut child = started(folder, line);
-    // Where it ends early, it does not take them all.
+    // A program that ends early does not read them all.
     let _ = child.stdin.take().unwrap().write_all(bytes);
     child.wait_with_output().unwrap()
 }
 
-/// All frames with both views beside each other, by the luma alone.
+/// All frames with both views side by side, as luma only.
 fn grey_stream(header: &str) -> Vec<u8> {
     let mut bytes = header.as_bytes().to_vec();
     for (_, scene) in SCENES {
@@ -98,14 +97,14 @@ fn files_in_any_order_give_the_maps_of_match() {
         assert_eq!(maps(&folder.join(&output), names), wanted, "{line}");
         assert_eq!(listing(&folder.join(&output)).len(), 3);
     }
-    // Control: views exchanged are another pair.
+    // Control: swapped views give other maps.
     run(&folder, &format!("sequence right left swapped --quiet {RANGE}")).succeeded();
     assert_ne!(maps(&folder.join("swapped"), names), wanted);
 }
 
-/// As ffmpeg and OpenCV name them.
+/// Patterns as in ffmpeg and OpenCV.
 #[test]
-fn numbers_are_named_as_in_c() {
+fn printf_patterns_select_images() {
     let folder = cameras();
     let wanted = wanted(&folder);
     for file in ["left/f01.png", "left/f007x.png"] {
@@ -115,13 +114,13 @@ fn numbers_are_named_as_in_c() {
     fs::remove_file(folder.join("left/f01.png")).unwrap();
     run(&folder, &format!("{line} {RANGE}")).succeeded();
     assert_eq!(maps(&folder.join("maps"), SCENES.map(|(name, _)| name)), wanted);
-    assert_eq!(listing(&folder.join("maps")).len(), 3, "f007x is no number");
-    // With at least two digits there is one frame.
+    assert_eq!(listing(&folder.join("maps")).len(), 3, "f007x does not match");
+    // With at least two digits, one frame matches.
     run(&folder, &format!("sequence left/f%02d.png right/f%02d.ppm two --quiet {RANGE}")).succeeded();
     assert_eq!(listing(&folder.join("two")).into_keys().collect::<Vec<_>>(), [folder.join("two/f10.pfm")]);
 }
 
-/// What `match` takes and writes of a pair, `sequence` does of each frame.
+/// Masks, calibrations and records work as in `match`.
 #[test]
 fn masks_calibrations_and_records_are_those_of_match() {
     let folder = cameras();
@@ -149,11 +148,11 @@ fn masks_calibrations_and_records_are_those_of_match() {
     }
     assert_eq!(lines[1]["files"]["calibration"], "left/calib.txt");
     assert_eq!(lines[1]["files"]["mask"], "mask.png");
-    // Control: another frame has other figures, and without the mask there is another map.
+    // Control: another frame has other figures, and without the mask the map differs.
     assert_ne!(lines[0]["measured"], one["measured"]);
     run(&folder, "sequence left right maps --device cpu --quiet").succeeded();
     assert!(at("one.pfm") != at("maps/f2.pfm"));
-    // A plan, and nothing else.
+    // A dry run only prints the plan.
     let before = listing(&folder);
     run(&folder, "sequence left right never --device cpu --dry-run")
         .prints("64 x 48 pixels, disparities 0 to 23");
@@ -163,7 +162,7 @@ fn masks_calibrations_and_records_are_those_of_match() {
     assert_eq!(told.stdout.lines().count(), 3);
 }
 
-/// A region of every frame is that of `match`, with its record, depth and picture.
+/// Regions work as in `match`, for records, depth and pictures.
 #[test]
 fn regions_are_those_of_match() {
     let folder = cameras();
@@ -183,7 +182,7 @@ fn regions_are_those_of_match() {
     let one = json(folder.join("one.json"));
     assert_eq!((one["width"].as_u64(), one["region"].to_string()), (Some(20), "[30,8]".into()));
     assert!(fs::read_to_string(folder.join("maps.jsonl")).unwrap().contains("\"region\":[30,8]"));
-    // Points lie where those of the whole view lie, and the picture shows the part.
+    // Points keep their positions, and the picture shows the region.
     run(
         &folder,
         &format!("match left/f2.png right/f2.ppm whole.pfm {RANGE} --quiet --calib calib.txt --also points"),
@@ -204,7 +203,7 @@ fn regions_are_those_of_match() {
     };
     let [first, last] = columns(x_and_depth("one.points.ply"));
     assert!((first - 30.0).abs() < 0.01 && (last - 49.0).abs() < 0.01, "{first} to {last}");
-    // Control.
+    // Control: the whole view has points outside the region.
     assert!(columns(x_and_depth("whole.points.ply"))[0] < 29.0);
     for (roi, code, words) in
         [("1,2,3", 2, "--roi & such as 200,100"), ("60,0,5,5", 2, "--roi & not inside a view of 64 x 48")]
@@ -216,7 +215,7 @@ fn regions_are_those_of_match() {
     }
 }
 
-/// Frames that one camera lacks shift no other.
+/// Frames missing from one camera do not shift the others.
 #[test]
 fn images_find_their_partners_by_number() {
     let folder = cameras();
@@ -224,12 +223,12 @@ fn images_find_their_partners_by_number() {
     fs::remove_file(folder.join("right/f2.ppm")).unwrap();
     fs::remove_file(folder.join("left/f1.png")).unwrap();
     let line = format!("sequence left right maps --quiet {RANGE}");
-    let said = "left/f2.png has no partner of its number in right (nor has one other): leave out";
+    let said = "left/f2.png does not have a partner with its number in right (nor does one other): skip";
     run(&folder, &line).failed(1, said);
     run(&folder, &format!("{line} --pairing common")).succeeded();
     assert_eq!(listing(&folder.join("maps")).len(), 1);
     assert_eq!(fs::read(folder.join("maps/f10.pfm")).unwrap(), wanted[2]);
-    // Control: in order, f2 has another partner.
+    // Control: in order, f2 gets another partner.
     run(&folder, &format!("{line} --pairing order")).succeeded();
     assert_ne!(fs::read(folder.join("maps/f2.pfm")).unwrap(), wanted[1]);
 }
@@ -238,7 +237,7 @@ fn images_find_their_partners_by_number() {
 fn streams_give_the_maps_of_their_pixels() {
     let folder = cameras();
     let numbers = ["000000", "000001", "000002"];
-    // Pixels alone: what the files hold.
+    // Raw pixels of the files.
     let mut raw = Vec::new();
     for (_, scene) in SCENES {
         for view in [0, 1] {
@@ -249,12 +248,12 @@ fn streams_give_the_maps_of_their_pixels() {
     let output = fed(&folder, &format!("{line} {RANGE}"), &raw);
     assert!(output.status.success(), "{output:?}");
     assert_eq!(maps(&folder.join("raw"), numbers), wanted(&folder));
-    // Luma alone, in a stream, a file, and grey images.
+    // Luma only, in a stream, a file, and grey images.
     let grey = grey_stream(GREY);
     fs::write(folder.join("both.y4m"), &grey).unwrap();
     let output = fed(&folder, &format!("sequence - piped {RANGE}"), &grey);
     assert!(output.status.success(), "{output:?}");
-    // A pipe may hand its header on in pieces.
+    // A pipe may deliver the header in pieces.
     let mut child = started(&folder, &format!("sequence - pieces {RANGE}"));
     let mut stdin = child.stdin.take().unwrap();
     for piece in [&grey[..5], &grey[5..30], &grey[30..]] {
@@ -279,7 +278,7 @@ fn streams_give_the_maps_of_their_pixels() {
     }
 }
 
-/// The header, and the pictures of a film, as luma.
+/// The header of a film, and the luma of its pictures.
 fn film(bytes: &[u8], (width, height): (usize, usize)) -> (String, Vec<Vec<u8>>) {
     let end = bytes.iter().position(|byte| *byte == b'\n').unwrap();
     let header = String::from_utf8(bytes[..end].into()).unwrap();
@@ -314,7 +313,7 @@ fn films_show_the_previews() {
         assert!(off(picture, name) <= 1.0, "{name}");
     }
     assert!(off(&pictures[0], "f10") > 20.0, "control: another frame looks different");
-    // To standard output, beside the left image, at the rate of the stream.
+    // On standard output, with the left image beside the map, at the frame rate of the input.
     let output =
         fed(&folder, &format!("sequence - - --also side-by-side --quiet {RANGE}"), &grey_stream(GREY));
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
@@ -343,13 +342,13 @@ fn raw_frames_are_rectified_once_and_for_all() {
     for end in ["pfm", "depth.pfm", "points.ply"] {
         assert!(same(&format!("maps/b.{end}"), &format!("a.{end}")), "{end}");
     }
-    // Control: unrectified views are another pair.
+    // Control: unrectified views give other maps.
     run(&folder, "sequence left right others --max-disparity 31 --device cpu --quiet").succeeded();
     assert!(!same("others/a.pfm", "a.pfm"));
 }
 
 #[test]
-fn sequences_that_make_no_sense_are_told_in_one_line() {
+fn invalid_sequences_are_reported_in_one_line() {
     let folder = cameras();
     for name in ["none", "fewer", "twice", "odd"] {
         fs::create_dir(folder.join(name)).unwrap();
@@ -375,10 +374,10 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
     for (line, code, words) in [
         ("left right maps --max-disparity auto --calib nothing.yml", 1, "nothing.yml"),
         ("nowhere right maps", 1, "nowhere"),
-        ("none maps", 1, "none & holds no images"),
+        ("none maps", 1, "none & contains no images"),
         ("left/*.jpg right/* maps", 1, "left/*.jpg & no image"),
-        ("left fewer maps", 1, "left/f2.png has no partner & fewer (nor has one other)"),
-        ("left fewer maps --pairing order", 1, "left holds 3 & fewer 1"),
+        ("left fewer maps", 1, "left/f2.png does not have a partner & fewer (nor does one other)"),
+        ("left fewer maps --pairing order", 1, "left has 3 images & fewer has 1"),
         ("twice maps", 1, "f1.png & F1.ppm"),
         ("odd maps", 1, "frame a & 63 x 48 & odd"),
         ("left/f1.png right/f1.ppm maps", 1, "left/f1.png & neither a folder"),
@@ -407,13 +406,13 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
         ("left right maps --format png --min-disparity -9", 2, "png"),
         ("left", 2, "OUTPUT"),
         ("head.y4m maps --raw-frames 64x48,gray", 1, "head.y4m & YUV4MPEG2 & --raw-frames"),
-        ("left/f1.png maps --raw-frames 8x8,gray", 1, "f1.png & leave out --raw-frames"),
+        ("left/f1.png maps --raw-frames 8x8,gray", 1, "f1.png & remove --raw-frames"),
         ("left right maps --raw-frames 64x48,gray", 2, "--raw-frames & streams"),
         ("left right maps --layout top-bottom", 2, "--layout & RIGHT"),
         ("left right none/film.y4m --format png", 2, "--format & folder"),
         ("left right film.GIF", 2, "OUTPUT & NAME.y4m & ffmpeg -i - film.GIF"),
         ("left/f%02.png right maps", 1, "f%02.png & left/*.png & %04d"),
-        ("left/g%d.png right maps", 1, "g%d.png & no image has such a name"),
+        ("left/g%d.png right maps", 1, "g%d.png & no image matches"),
         ("left right maps --mask none.png", 1, "none.png"),
         ("left right maps --mask above/f1.tif", 1, "frame f1 & the mask is 64 x 96"),
         ("left right - --json -", 2, "--json & film"),
@@ -427,9 +426,9 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
     }
 }
 
-/// What stops in the middle of a sequence leaves whole maps of all frames before.
+/// After a failure in the middle of a sequence, the maps of all earlier frames are complete.
 #[test]
-fn what_was_done_before_a_failure_stays() {
+fn finished_frames_survive_a_failure() {
     let folder = cameras();
     let wanted = wanted(&folder);
     let whole = grey_stream(GREY);
@@ -481,7 +480,7 @@ fn what_was_done_before_a_failure_stays() {
 
 #[cfg(unix)]
 #[test]
-fn what_was_done_before_a_signal_stays() {
+fn finished_frames_survive_a_signal() {
     let folder = Folder::new();
     // Two frames, and a third that never ends.
     let stream = grey_stream(GREY);
@@ -496,7 +495,7 @@ fn what_was_done_before_a_signal_stays() {
         child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
         (child.wait().unwrap().code(), said)
     };
-    // A producer that has not said a word, or half of one.
+    // A producer that has sent nothing, or half a header or frame.
     for (signal, said) in [("-TERM", &b""[..]), ("-INT", b"YUV4"), ("-INT", &stream[..2000])] {
         let mut child = started(&folder, &format!("sequence - never {RANGE}"));
         child.stdin.as_mut().unwrap().write_all(said).unwrap();
@@ -520,7 +519,7 @@ fn what_was_done_before_a_signal_stays() {
         assert!(code == Some(130) && said.ends_with(end), "{signal}: {code:?}: {said}");
         assert_eq!(listing(&folder.join(output)).len(), 2, "{signal}");
     }
-    // A film has no name before its end, so nobody sees how far it is.
+    // A film has no name until it ends, so its progress is invisible.
     let hang_up = if cfg!(target_os = "linux") { "-HUP" } else { "-TERM" };
     for (output, signal) in [("film.y4m", "-TERM"), ("found.mcap", hang_up)] {
         let done = [1, 4, 16].into_iter().any(|seconds| {
@@ -536,18 +535,18 @@ fn what_was_done_before_a_signal_stays() {
     assert_eq!(film.windows(6).filter(|bytes| bytes == b"FRAME\n").count(), 2);
 }
 
-/// A reader of a film that leaves ends the sequence in one line.
+/// A player that closes the pipe ends the sequence with one line.
 #[cfg(unix)]
 #[test]
-fn a_player_that_is_closed_ends_it() {
+fn a_closed_player_ends_the_sequence() {
     let folder = cameras();
     let line = format!("sequence left right - --quiet {RANGE}");
     let mut child = started(&folder, &line);
     drop(child.stdout.take());
-    Run::of(&line, child.wait_with_output().unwrap()).failed(1, "its reader left");
+    Run::of(&line, child.wait_with_output().unwrap()).failed(1, "the reader closed it");
 }
 
-/// On a GPU frames overlap; the maps are the same.
+/// Frames overlap on a GPU; the maps are the same.
 #[test]
 fn a_device_gives_the_same_maps() {
     if !has_gpu() {

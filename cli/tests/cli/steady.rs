@@ -1,4 +1,4 @@
-//! `mrfgs sequence --steady`: the maps are what the library's filter makes of those of the frames alone.
+//! `mrfgs sequence --steady`: the maps equal those of the library's filter applied to unfiltered maps.
 
 use mrfgs::image::{Pair, Rect};
 use mrfgs::maps::Maps;
@@ -7,7 +7,7 @@ use mrfgs::steady::Steady;
 use super::*;
 
 #[test]
-fn steady_maps_follow_their_past() {
+fn steady_maps_equal_the_librarys() {
     let folder = Folder::new();
     for (view, name) in [("left", "im0.png"), ("right", "im1.png")] {
         fs::create_dir(folder.join(view)).unwrap();
@@ -31,7 +31,7 @@ fn steady_maps_follow_their_past() {
         let map = image::open(path).unwrap().into_luma8();
         Plane::new(map.width() as usize, map.height() as usize, map.into_raw())
     };
-    // What the library makes of the maps of the frames alone.
+    // The library's filter applied to the unfiltered maps.
     let expected = |alone: &str, rect: Option<Rect>| -> Vec<Plane<f32>> {
         let mut steady = Steady::new();
         let frames = (0..3).map(|step| {
@@ -54,7 +54,7 @@ fn steady_maps_follow_their_past() {
             let [before, now] =
                 [alone, steady].map(|name| read_pfm(folder.join(format!("{name}/{step}.pfm"))));
             assert!(now == *expected, "{steady} {step}");
-            // Control: only the first frame has no past.
+            // Control: only the first frame is unchanged.
             assert_eq!(now == before, step == 0, "{steady} {step}");
         }
     }

@@ -1,13 +1,13 @@
-//! `mrfgs sequence` of a rig whose right camera has turned since it was calibrated.
+//! `mrfgs sequence` with a rig whose right camera has turned since its calibration.
 
 use mrfgs::calibration::matrix::rotation;
 
 use super::*;
 
-/// How far the right camera looks up, to the right and clockwise from where `wrong.yml` has it, in degrees.
+/// How far the right camera looks up, right and clockwise relative to `wrong.yml`, in degrees.
 const TURNED: [f64; 3] = [0.4, 0.0, -0.5];
 
-/// The frames of a camera that stands still, and the calibration of its rig: as it stands, and as it stood before it turned.
+/// Frames of a static scene, and calibrations of the rig: the true one, and one from before the turn.
 fn rig() -> Folder {
     let folder = Folder::new();
     for (view, name) in [("left", "im0.png"), ("right", "im1.png")] {
@@ -30,7 +30,7 @@ fn rig() -> Folder {
             text += &matrix(&format!("K{camera}"), 3, &values);
             text += &matrix(&format!("D{camera}"), 5, &[0.0; 5]);
         }
-        // Points turn the other way than the camera, and this is how it stood before.
+        // Points turn opposite to the camera, and this is the earlier pose.
         let before = rotation(degrees.map(f64::to_radians));
         text += &matrix("R", 3, before.as_flattened());
         text += &matrix("T", 1, &before.map(|row| -0.16 * row[0]));
@@ -46,15 +46,15 @@ fn last(folder: &Folder, file: &str) -> Value {
 }
 
 #[test]
-fn a_camera_that_has_turned_is_told_and_corrected() {
+fn a_turned_camera_is_reported_and_corrected() {
     let folder = rig();
     let line = "sequence left right maps --rectify --max-disparity 31 --method fast --device cpu";
-    let said = "the right camera has turned since the calibration, by these degrees: 0.4";
+    let said = "the right camera has turned since the calibration, in degrees: 0.4";
     run(&folder, &format!("{line} --calib wrong.yml --json wrong.json")).succeeded().says(said);
     let corrected =
         run(&folder, &format!("{line} --calib wrong.yml --json corrected.json --recalibrate")).succeeded();
     corrected.says(said);
-    corrected.says("that is corrected");
+    corrected.says("frames are corrected for this");
     let right =
         run(&folder, &format!("{line} --calib right.yml --json right.json --recalibrate")).succeeded();
     assert!(!right.stderr.contains("has turned"), "control: {}", right.stderr);
@@ -63,24 +63,24 @@ fn a_camera_that_has_turned_is_told_and_corrected() {
         let record = last(&folder, file);
         for (i, expected) in expected.into_iter().enumerate() {
             let found = record["turned"][i].as_f64().unwrap();
-            // Matches of so small images do not show a turn to a side.
+            // Matches in such small images do not determine a turn to the side.
             let most = if i == 1 { 0.2 } else { 0.05 };
             assert!((found - expected).abs() < most, "{file}: {}", record["turned"]);
         }
     }
     let measured = |file| last(&folder, file)["measured"].as_f64().unwrap();
-    // What turns loses some of its border.
+    // Corrected frames lose some of the border.
     let [wrong, corrected, right] = ["wrong.json", "corrected.json", "right.json"].map(measured);
     assert!(corrected > wrong + 1.0 && right > corrected, "{wrong}, {corrected}, {right}");
 }
 
 #[test]
-fn it_takes_the_cameras() {
+fn it_needs_the_cameras() {
     let folder = rig();
     let line = "sequence left right maps --max-disparity 31 --method fast --device cpu --recalibrate";
-    run(&folder, line).failed(2, "--recalibrate: takes the cameras; give them with --calib");
+    run(&folder, line).failed(2, "--recalibrate: needs camera values; add --calib");
     assert!(!folder.join("maps").exists());
-    // With their numbers alone the frames count as rectified, and are.
+    // With --focal the frames count as rectified, which they are.
     let told = run(&folder, &format!("{line} --focal 180 --baseline 0.16m --json -")).succeeded();
     told.prints("\"turned\":[");
 }

@@ -1,12 +1,12 @@
-//! Pairs without a calibration: rectified by their own matches, and turned upright.
+//! Pairs without a calibration: rectified from their own matches, and rotated upright.
 
 use super::files::{Png, exif_orientation};
 use super::*;
 
-/// A grey copy of a picture, stored as a camera with this orientation stores it.
+/// A grey copy of a picture, stored as by a camera with this orientation.
 fn stored(name: &str, orientation: u8, to: &Path) {
     let upright = image::open(scene(name)).unwrap().to_luma8();
-    // The way that a reader turns back.
+    // The inverse of the reader's rotation.
     let turned = match orientation {
         3 => image::imageops::rotate180(&upright),
         6 => image::imageops::rotate270(&upright),
@@ -30,14 +30,16 @@ fn stored(name: &str, orientation: u8, to: &Path) {
 fn a_pair_is_rectified_by_its_matches() {
     let folder = Folder::new();
     let rectified = run(&folder, "rectify @raw/left.png @raw/right.png out --maps").succeeded();
-    rectified.says("rectified by its own matches, without a scale & matches agree & in 95 % & of the left");
+    rectified.says(
+        "rectified without a calibration, so there is no scale & matches agree & in 95 % & of the left",
+    );
     let written: Vec<_> = listing(&folder.join("out")).into_keys().collect();
     assert_eq!(written.len(), 8, "two pictures, two masks, four maps: {written:?}");
     assert!(!folder.join("out/calib.txt").exists());
 
-    // On the way it gives the same bits.
+    // Rectifying within `match` gives the same bits.
     let end = "--device cpu";
-    // Without the flag no range is found, and the line says what helps.
+    // Without the flag no range is found, and the error suggests it.
     run(&folder, &format!("match @raw/left.png @raw/right.png a.pfm {end}"))
         .failed(1, "too few matches & not rectified & --rectify & --max-disparity");
     assert!(!folder.join("a.pfm").exists());
@@ -51,7 +53,7 @@ fn a_pair_is_rectified_by_its_matches() {
         &folder,
         &format!("match @raw/left.png @raw/right.png a.pfm --rectify {end} --json a.json --also preview"),
     );
-    said.succeeded().says("rectified by its own matches");
+    said.succeeded().says("rectified without a calibration");
     run(&folder, &format!("match out/im0.png out/im1.png b.pfm {end}")).succeeded();
     assert!(fs::read(folder.join("a.pfm")).unwrap() == fs::read(folder.join("b.pfm")).unwrap());
     let record = json(folder.join("a.json"));
@@ -63,7 +65,7 @@ fn a_pair_is_rectified_by_its_matches() {
         "{trust}"
     );
 
-    // Nearly as much is found in both views as by the calibration, and without any rectification next to nothing.
+    // The share seen in both views is nearly that of the calibration, and almost zero without a rectification.
     run(
         &folder,
         &format!(
@@ -86,7 +88,7 @@ fn a_pair_is_rectified_by_its_matches() {
 }
 
 #[test]
-fn photographs_are_turned_upright() {
+fn photos_are_rotated_upright() {
     let folder = Folder::new();
     for (name, view) in [("left", "im0"), ("right", "im1")] {
         stored(&format!("slanted/{view}.png"), 1, &folder.join(format!("{name}.png")));
@@ -107,7 +109,7 @@ fn photographs_are_turned_upright() {
         let (turned, said) = map(pair, "--orient");
         assert!(turned == upright && !said.contains("orientation"), "{pair}: {said}");
     }
-    // Without the flag one line says so.
+    // Without the flag a line suggests it.
     for (pair, which) in
         [("left3.png right3.png", "both images are"), ("left.png right3.png", "the right image is")]
     {
@@ -119,7 +121,7 @@ fn photographs_are_turned_upright() {
     }
     run(&folder, "match left.png right6.png d.pfm").failed(1, "240 x 180 & 180 x 240");
 
-    // Without a calibration each is turned by its own tag, with a mask that fits the upright image.
+    // Without a calibration each image is rotated by its own tag, and the mask fits the upright image.
     image::GrayImage::from_fn(240, 180, |x, _| image::Luma([if x < 9 { 255 } else { 0 }]))
         .save(folder.join("mask.png"))
         .unwrap();
@@ -131,10 +133,10 @@ fn photographs_are_turned_upright() {
     assert!(upright == bits("left6.png right8.png", "b"));
     assert!(upright == bits("left3.png right.png", "c"));
     let (map, said) = map("left8.png right3.png", "--rectify --min-disparity -9");
-    assert!(said.contains("rectified by its own matches") && !said.contains("orientation"), "{said}");
+    assert!(said.contains("rectified without a calibration") && !said.contains("orientation"), "{said}");
     assert!(!map.is_empty());
 
-    // A calibration is of the pixels as they are stored.
+    // A calibration applies to pixels as stored.
     let calibrated =
         |pair: &str, out: &str| run(&folder, &format!("rectify {pair} {out} --calib @raw/cameras.yml"));
     calibrated("left3.png right3.png", "d").succeeded();

@@ -1,6 +1,5 @@
-//! Topics of ROS 2, live and without ROS: [`names`] resolves them as ROS does, and [`topics`] subscribes to them and publishes them over
-//! DDS. Messages come and go in their bytes, which [`mrfgs_ros::messages`] takes apart and puts together. [`viewer`] shows topics to
-//! Foxglove.
+//! Live ROS 2 topics without ROS: [`names`] resolves topic names as ROS does, [`topics`] subscribes and publishes over DDS, with messages
+//! in the serialization of [`mrfgs_ros::messages`], and [`viewer`] shows topics to Foxglove.
 
 #![forbid(unsafe_code)]
 

@@ -1,25 +1,23 @@
-//! The names of topics: expanded by a namespace and remapped, as nodes of ROS 2 do it
-//! (<https://design.ros2.org/articles/topic_and_service_names.html>).
+//! Topic names with namespaces and remapping, as for ROS 2 nodes (<https://design.ros2.org/articles/topic_and_service_names.html>).
 
 use std::str::FromStr;
 
 use mrfgs::error::Reason;
 
-/// A rule that gives a topic another name, as ROS writes it: `FROM:=TO`. The rule `__ns:=/NAMESPACE` sets the namespace, and
-/// `__node:=NAME` the name of the node.
+/// A remapping rule in ROS's syntax `FROM:=TO`. `__ns:=/NAMESPACE` sets the namespace, and `__node:=NAME` the node name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rule {
     from: String,
     to: String,
 }
 
-/// How names are resolved.
+/// Resolves names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Names {
-    /// Begins with a slash, and ends with none unless it is `/`.
+    /// Starts with a slash and ends without one, except for `/`.
     namespace: String,
     node: String,
-    /// Full names, before and after.
+    /// Full names, before and after remapping.
     rules: Vec<(String, String)>,
 }
 
@@ -37,15 +35,15 @@ impl FromStr for Rule {
 }
 
 impl Names {
-    /// Those of a node called `node`, unless a rule gives it another name.
+    /// The names of a node called `node`, unless a rule renames it.
     ///
     /// # Errors
-    /// Where a rule holds what is no name of ROS.
+    /// If a rule contains an invalid name.
     pub fn new(node: &str, rules: &[Rule]) -> Result<Self, Reason> {
         let set = |words: &[&str]| rules.iter().find(|rule| words.contains(&rule.from.as_str()));
         let node = set(&["__node", "__name"]).map_or(node, |rule| &rule.to).to_owned();
         if !is_part(&node) {
-            return Err(format!("{node:?} is no name of a node, which takes letters, digits and _").into());
+            return Err(format!("{node:?} is not a valid node name; use letters, digits and _").into());
         }
         let namespace = set(&["__ns"]).map_or("/", |rule| &rule.to);
         let namespace = format!("/{}", namespace.trim_matches('/'));
@@ -66,7 +64,7 @@ impl Names {
         &self.node
     }
 
-    /// Its namespace, which begins with a slash.
+    /// The namespace, with leading slash.
     #[must_use]
     pub fn namespace(&self) -> &str {
         &self.namespace
@@ -75,20 +73,20 @@ impl Names {
     /// The full name of the topic `name`, remapped.
     ///
     /// # Errors
-    /// Where it is no name of ROS.
+    /// If it is not a valid name.
     pub fn resolve(&self, name: &str) -> Result<String, Reason> {
         let full = self.full(name)?;
         let rule = self.rules.iter().find(|(from, _)| *from == full);
         Ok(rule.map_or(full, |(_, to)| to.clone()))
     }
 
-    /// Whether a rule gives the topic `name` another name.
+    /// Whether a rule remaps the topic `name`.
     #[must_use]
     pub fn remaps(&self, name: &str) -> bool {
         self.full(name).is_ok_and(|full| self.rules.iter().any(|(from, _)| *from == full))
     }
 
-    /// `name` below the namespace, or below the node's own where it begins with `~/`.
+    /// `name` in the namespace, or in the node's own for names that start with `~/`.
     fn full(&self, name: &str) -> Result<String, Reason> {
         let namespace = self.namespace.trim_end_matches('/');
         let full = match name.strip_prefix("~/") {
@@ -101,14 +99,14 @@ impl Names {
     }
 }
 
-/// Refuses what is no full name.
+/// Refuses an invalid full name.
 fn check(full: &str) -> Result<(), Reason> {
     let is_name = full.strip_prefix('/').is_some_and(|parts| parts.split('/').all(is_part));
     if is_name {
         return Ok(());
     }
     let reason = format!(
-        "{full:?} is no name of ROS, whose parts between slashes take letters, digits and _, and begin with no digit"
+        "{full:?} is not a valid ROS name; between slashes use letters, digits and _, not starting with a digit"
     );
     Err(reason.into())
 }
@@ -138,7 +136,7 @@ mod tests {
             (&["__ns:=/robot"], "/disparity", "/disparity"),
             (&["left/image_raw:=/cam0/image_raw"], "left/image_raw", "/cam0/image_raw"),
             (&["left/image_raw:=/cam0/image_raw"], "right/image_raw", "/right/image_raw"),
-            // The first rule counts, and what it gives is not remapped again.
+            // The first rule wins, and its result is not remapped again.
             (&["a:=b", "a:=c", "b:=d"], "a", "/b"),
             (&["__ns:=/x", "/x/a:=b"], "a", "/x/b"),
         ] {

@@ -20,29 +20,29 @@ use rustdds::{
     Subscriber, Topic, TopicKind,
 };
 
-/// Largest domain that `ROS_DOMAIN_ID` may name.
+/// The largest domain for `ROS_DOMAIN_ID`.
 pub const MOST_DOMAIN: u16 = 232;
-/// Bytes of a message that say how the rest is laid out.
+/// Length of the header of a message, which states its serialization.
 const HEAD: usize = 4;
-/// The topic on which members of a domain say which nodes they are.
+/// The topic on which participants announce their nodes.
 const GRAPH: &str = "ros_discovery_info";
-/// The bytes that identify a reader or a writer in ROS 2 since Iron.
+/// Bytes of an identifier in ROS 2 since Iron.
 pub const GID_BYTES: usize = 16;
-/// The same in Humble and before.
+/// Bytes of an identifier in Humble and earlier.
 pub const LONG_GID_BYTES: usize = 24;
-/// Messages of a subscription that wait to be taken, as many as ROS keeps of sensors.
+/// Queue length of a subscription, as in ROS's sensor profile.
 const WAITING: i32 = 5;
-/// Messages of a publication that may still have to be sent again.
+/// Number of messages that a publication keeps for retransmission.
 const SENT: i32 = 2;
-/// Messages that subscribers may leave unconfirmed: those of two seconds at most rates.
+/// Maximum number of unconfirmed messages, about two seconds at typical rates.
 const UNCONFIRMED: i32 = 64;
-/// How long a publication waits for its subscribers before it gives a message up.
+/// How long a publication waits for subscribers before it drops a message.
 const PATIENCE: rustdds::Duration = rustdds::Duration::from_millis(20);
 
-/// Shorthand for what comes of DDS.
+/// A result of DDS.
 pub type Result<T> = std::result::Result<T, Reason>;
 
-/// A member of a domain of DDS, which finds the others by itself.
+/// A participant in a DDS domain, which discovers the others automatically.
 pub struct Participant {
     inner: DomainParticipant,
     writers: Arc<Writers>,
@@ -54,7 +54,7 @@ impl Participant {
     /// Joins `domain`: 0 to [`MOST_DOMAIN`].
     ///
     /// # Errors
-    /// Where the network cannot be used.
+    /// If the network cannot be used.
     pub fn new(domain: u16) -> Result<Self> {
         let inner = DomainParticipantBuilder::new(domain).build().map_err(failed)?;
         let qos = QosPolicyBuilder::new().build();
@@ -63,15 +63,15 @@ impl Participant {
         Ok(Self { inner, writers: Arc::default(), subscriber, publisher })
     }
 
-    /// The topic `name`, a full one, of messages of the type `kind`, such as `sensor_msgs/msg/Image`.
+    /// The topic with the full name `name` and message type `kind`, such as `sensor_msgs/msg/Image`.
     fn topic(&self, name: &str, kind: &str, qos: &QosPolicies) -> Result<Topic> {
         self.inner.create_topic(full(name), in_dds(kind), qos, TopicKind::NoKey).map_err(failed)
     }
 
-    /// Publishes messages of the type `kind` on the topic `name`, which is a full one. They are sent again to those who ask for that.
+    /// Publishes messages of type `kind` on the topic with the full name `name`, reliably for subscribers that ask for it.
     ///
     /// # Errors
-    /// Where DDS fails.
+    /// If DDS fails.
     pub fn publish(&self, name: &str, kind: &str) -> Result<Publication> {
         let qos = qos(Reliability::Reliable { max_blocking_time: PATIENCE }, SENT, UNCONFIRMED);
         let topic = self.topic(name, kind, &qos)?;
@@ -79,11 +79,11 @@ impl Participant {
         Ok(Publication { writer, listeners: 0, _participant: self.inner.clone() })
     }
 
-    /// Tells the tools of ROS that this member of the domain is the node `name` in `namespace`, as long as what is returned is kept.
-    /// Identifiers take `gid_bytes`: [`GID_BYTES`], or those of older releases.
+    /// Announces this participant to ROS tools as the node `name` in `namespace`, as long as the result is kept. Identifiers have
+    /// `gid_bytes` bytes: [`GID_BYTES`], or [`LONG_GID_BYTES`] for older releases.
     ///
     /// # Errors
-    /// Where DDS fails.
+    /// If DDS fails.
     pub fn announce<'a>(
         &self,
         [namespace, name]: [&str; 2],
@@ -105,7 +105,7 @@ impl Participant {
         let told = ParticipantEntitiesInfo { gid: gid(self.inner.guid()), nodes: vec![node] };
         let qos = QosPolicyBuilder::new()
             .reliability(Reliability::Reliable { max_blocking_time: PATIENCE })
-            // Who comes later gets it, too.
+            // Late joiners get it too.
             .durability(Durability::TransientLocal)
             .history(History::KeepLast { depth: 1 })
             .build();
@@ -123,7 +123,7 @@ fn full(name: &str) -> String {
     format!("rt{name}")
 }
 
-/// What ROS calls a type in DDS: `sensor_msgs::msg::dds_::Image_`.
+/// A type's name in DDS: `sensor_msgs::msg::dds_::Image_`.
 fn in_dds(kind: &str) -> String {
     let (package, own) = kind.rsplit_once('/').unwrap_or(("", kind));
     format!("{}::dds_::{own}_", package.replace('/', "::"))
@@ -136,7 +136,7 @@ fn in_ros(kind: &str) -> String {
     parts.map_or_else(|| kind.into(), |(package, own)| format!("{}/{own}", package.replace("::", "/")))
 }
 
-/// Of a topic that keeps so many messages, and so many of them at all until they are confirmed or taken.
+/// The quality of service of a topic that keeps `depth` messages, and at most `most` until they are confirmed or taken.
 fn qos(reliability: Reliability, depth: i32, most: i32) -> QosPolicies {
     let qos = QosPolicyBuilder::new().reliability(reliability).durability(Durability::Volatile);
     let limits = ResourceLimits { max_samples: most, max_instances: 1, max_samples_per_instance: most };
@@ -147,10 +147,10 @@ fn failed(error: impl std::fmt::Display) -> Reason {
     format!("DDS: {error}").into()
 }
 
-/// Messages as they lie in [`mrfgs_ros::messages`], with what says how.
+/// A message serialized as in [`mrfgs_ros::messages`], including its header.
 struct Message(Vec<u8>);
 
-/// What hands on the bytes of messages as they are.
+/// Passes serialized messages through unchanged.
 #[derive(Clone)]
 struct AsTheyAre;
 
@@ -200,16 +200,16 @@ impl SerializerAdapter<Bytes> for AsTheyAre {
     }
 }
 
-/// A topic that somebody listens to, or may.
+/// A published topic.
 pub struct Publication {
     writer: DataWriter<Bytes, AsTheyAre>,
     listeners: usize,
-    /// Nothing is sent without it.
+    /// Keeps the participant alive, without which nothing is sent.
     _participant: DomainParticipant,
 }
 
 impl Publication {
-    /// Whether anybody listens. It takes in who has come and gone, so ask often.
+    /// Whether there are subscribers. The call processes arrivals and departures, so call it often.
     pub fn has_listeners(&mut self) -> bool {
         while let Some(status) = self.writer.try_recv_status() {
             if let DataWriterStatus::PublicationMatched { current, .. } = status {
@@ -219,21 +219,21 @@ impl Publication {
         self.listeners > 0
     }
 
-    /// Sends a message, in the bytes of [`Encode`](mrfgs_ros::messages::Encode).
+    /// Sends a message encoded by [`Encode`](mrfgs_ros::messages::Encode).
     ///
     /// # Errors
-    /// Where its subscribers are too slow, or DDS fails.
+    /// If subscribers are too slow, or DDS fails.
     pub fn send(&self, message: Vec<u8>) -> Result<()> {
         let message = Bytes::from(message);
         let content = message.slice(HEAD.min(message.len())..);
         self.writer.write(content, None).map_err(|error| match error {
-            WriteError::WouldBlock { .. } => "its subscribers do not confirm what they get".into(),
+            WriteError::WouldBlock { .. } => "its subscribers do not confirm messages".into(),
             error => failed(error),
         })
     }
 }
 
-/// What tools of ROS are told of a node.
+/// Keeps a node announced to ROS tools.
 pub struct Announcement {
     _publication: Publication,
 }
@@ -286,7 +286,7 @@ impl Subscription {
     }
 }
 
-/// Subscriptions of one thread, which it waits for together.
+/// Subscriptions of one thread, which waits for all of them together.
 pub struct Subscriptions {
     of: Vec<Subscription>,
     poll: Poll,
@@ -294,20 +294,20 @@ pub struct Subscriptions {
 }
 
 impl Subscriptions {
-    /// None yet.
+    /// An empty set of subscriptions.
     ///
     /// # Errors
-    /// Where the system has nothing to wait with.
+    /// If the system provides no polling.
     pub fn new() -> Result<Self> {
         let poll = Poll::new().map_err(failed)?;
         Ok(Self { of: Vec::new(), poll, events: Events::with_capacity(16) })
     }
 
-    /// Adds the topic `name`, a full one, of messages of the type `kind`. Those are the sender's who sends once, and if `reliable` only
-    /// those of one who sends again what was lost.
+    /// Subscribes to the topic with the full name `name` and message type `kind`. A `reliable` subscription only receives from publishers
+    /// that retransmit lost messages.
     ///
     /// # Errors
-    /// Where DDS fails.
+    /// If DDS fails.
     pub fn add(&mut self, to: &Participant, name: &str, kind: &str, reliable: bool) -> Result<()> {
         let reliability = if reliable {
             Reliability::Reliable { max_blocking_time: PATIENCE }
@@ -325,11 +325,11 @@ impl Subscriptions {
         Ok(())
     }
 
-    /// Waits for messages, for at most so long, and hands on those that came: the number of the topic, in the order in which they were
-    /// added, and the bytes as [`mrfgs_ros::messages`] takes them. Messages of another type than that of the topic are left out.
+    /// Waits up to `patience` for messages and passes them on: the number of the topic, in the order of adding, and the bytes as in
+    /// [`mrfgs_ros::messages`].
     ///
     /// # Errors
-    /// Where DDS fails for good.
+    /// If DDS fails permanently.
     pub fn wait(&mut self, patience: Duration, mut take: impl FnMut(usize, Vec<u8>)) -> Result<()> {
         match self.poll.poll(&mut self.events, Some(patience)) {
             Err(error) if error.kind() != std::io::ErrorKind::Interrupted => return Err(failed(error)),

@@ -1,5 +1,5 @@
-//! Topics for Foxglove and what else speaks its WebSocket protocol (<https://github.com/foxglove/ws-protocol>), which shows them in two and
-//! three dimensions while they come.
+//! Topics for Foxglove and other viewers with its WebSocket protocol (<https://github.com/foxglove/ws-protocol>), which show them live in
+//! 2D and 3D.
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -16,17 +16,17 @@ use tungstenite::handshake::server::{ErrorResponse, Request, Response};
 use tungstenite::http::{HeaderValue, StatusCode};
 use tungstenite::{Error, Message, WebSocket};
 
-/// The versions of the protocol, the newest first. Both have what is used here.
+/// The supported protocol versions, newest first. Both have all that is used here.
 const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 const PROTOCOL: &str = "sec-websocket-protocol";
-/// How long a viewer is listened to before it is told what is new.
+/// How long to listen to a viewer before sending it news.
 const TURN: Duration = Duration::from_millis(10);
-/// How long a viewer may take to take a message in.
+/// How long a viewer may take to receive a message.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// The first byte of a message of a topic.
+/// The first byte of a topic's message.
 const MESSAGE_DATA: u8 = 1;
 
-/// Shows topics to whoever connects.
+/// Shows topics to connected viewers.
 pub struct Viewer {
     shared: Arc<Mutex<Shared>>,
     address: SocketAddr,
@@ -34,17 +34,17 @@ pub struct Viewer {
 
 #[derive(Default)]
 struct Shared {
-    /// The topics so far, each with the type of its messages. Their places are their numbers.
+    /// The topics so far, each with its message type. The index is the topic's number.
     topics: Vec<(String, &'static str)>,
     viewers: Vec<Weak<Mutex<Waiting>>>,
 }
 
-/// What one viewer has asked for, and not yet got.
+/// The subscriptions of a viewer, and its pending messages.
 #[derive(Default)]
 struct Waiting {
     /// The topic of each subscription, by the viewer's number for it.
     subscriptions: BTreeMap<u32, usize>,
-    /// The newest message of each topic, with its time: a viewer that is slow leaves out those before.
+    /// The newest message of each topic, with its time; slow viewers skip older ones.
     newest: BTreeMap<usize, (Stamp, Bytes)>,
 }
 
@@ -53,10 +53,10 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Viewer {
-    /// One that listens at `address`, such as `localhost:8765`; with port 0 the system chooses one.
+    /// Listens at `address`, such as `localhost:8765`; port 0 lets the system choose.
     ///
     /// # Errors
-    /// Where nobody can listen there.
+    /// If it cannot listen there.
     pub fn new(address: &str) -> Result<Self, Reason> {
         let listener = TcpListener::bind(address).map_err(Reason::from)?;
         let address = listener.local_addr().map_err(Reason::from)?;
@@ -73,13 +73,13 @@ impl Viewer {
         Ok(Self { shared, address })
     }
 
-    /// Where it listens.
+    /// The address it listens at.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Shows a message of `topic`, with its time, to all who have subscribed to it. A topic is told of with its first message.
+    /// Sends a message of `topic`, with its time, to all subscribers. The first message of a topic announces it.
     pub fn show<M: Encode>(&mut self, topic: &str, stamp: Stamp, message: &M) {
         let mut shared = locked(&self.shared);
         let number = shared.topics.iter().position(|(name, _)| name == topic).unwrap_or_else(|| {
@@ -100,7 +100,7 @@ impl Viewer {
     }
 }
 
-/// Serves a viewer until it leaves, or there is nothing to see any more.
+/// Serves a viewer until it leaves or the server is dropped.
 fn serve(stream: TcpStream, shared: &Arc<Mutex<Shared>>) {
     let _ = stream.set_nodelay(true).and_then(|()| stream.set_read_timeout(Some(PATIENCE)));
     let Ok(mut socket) = tungstenite::accept_hdr(stream, choose) else { return };
@@ -142,7 +142,7 @@ fn serve(stream: TcpStream, shared: &Arc<Mutex<Shared>>) {
     let _ = socket.flush();
 }
 
-/// Answers with the version of the protocol that a viewer offers.
+/// Accepts the protocol version that a viewer offers.
 #[allow(clippy::result_large_err, reason = "the type of tungstenite's callback")]
 fn choose(request: &Request, mut response: Response) -> Result<Response, ErrorResponse> {
     let offered = request.headers().get_all(PROTOCOL).iter().filter_map(|value| value.to_str().ok());
@@ -157,14 +157,14 @@ fn choose(request: &Request, mut response: Response) -> Result<Response, ErrorRe
     Ok(response)
 }
 
-/// A topic as viewers are told of it.
+/// A topic as announced to viewers.
 fn channel(number: usize, (topic, kind): &(String, &'static str)) -> Value {
     json!({
         "id": number, "topic": topic, "encoding": "cdr", "schemaName": kind, "schema": definition(kind), "schemaEncoding": "ros2msg",
     })
 }
 
-/// Sends what waits for a viewer.
+/// Sends a viewer's pending messages.
 fn tell(socket: &mut WebSocket<TcpStream>, waiting: &Mutex<Waiting>) -> tungstenite::Result<()> {
     let ready: Vec<_> = {
         let Waiting { subscriptions, newest } = &mut *locked(waiting);
@@ -183,7 +183,7 @@ fn tell(socket: &mut WebSocket<TcpStream>, waiting: &Mutex<Waiting>) -> tungsten
     Ok(())
 }
 
-/// Takes in what a viewer says. What else there is in the protocol is for servers that take more.
+/// Handles a viewer's message. Other operations of the protocol need capabilities that this server does not have.
 fn listen(text: &str, waiting: &Mutex<Waiting>) {
     let Ok(said) = serde_json::from_str::<Value>(text) else { return };
     let list = |name: &str| said[name].as_array().cloned().unwrap_or_default().into_iter();
@@ -246,7 +246,7 @@ mod tests {
             socket.send(Message::binary(vec![9; 99])).unwrap();
             let ask = json!({"op": "subscribe", "subscriptions": [{"id": 5, "channelId": 0}]});
             socket.send(Message::text(ask.to_string())).unwrap();
-            // It is shown again until the question has arrived.
+            // Messages are repeated until the subscription has arrived.
             socket.get_ref().set_read_timeout(Some(TURN)).unwrap();
             let data = loop {
                 viewer.show("/b", Stamp(2), &image(2));

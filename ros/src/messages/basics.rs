@@ -1,18 +1,18 @@
-//! Times, and how the bytes of messages are laid out.
+//! Times and serializations of messages.
 
 use std::fmt;
 
 use mrfgs::error::Reason;
 
-/// Shorthand for what comes of the bytes of a message.
+/// The result of decoding a message.
 pub type Result<T> = std::result::Result<T, Reason>;
 
-/// How the bytes of a message are laid out.
+/// The serialization of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// That of ROS 2, in the byte order that its first bytes say.
+    /// CDR of ROS 2, in the byte order given by its first bytes.
     Cdr,
-    /// That of ROS 1.
+    /// The serialization of ROS 1.
     Ros1,
 }
 
@@ -20,10 +20,10 @@ pub enum Encoding {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Stamp(pub i64);
 
-/// Nanoseconds in a second.
+/// Nanoseconds per second.
 pub const SECOND: i64 = 1_000_000_000;
 
-/// In seconds, with all nine decimals.
+/// In seconds, with nine decimals.
 impl fmt::Display for Stamp {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let (sign, all) = (if self.0 < 0 { "-" } else { "" }, self.0.unsigned_abs());

@@ -1,13 +1,13 @@
-//! Numbers, texts and lists in the bytes of a message.
+//! Serialization of numbers, texts and lists.
 
 use std::borrow::Cow;
 
 use super::basics::{Encoding, Result, SECOND, Stamp};
 
-/// Bytes before the content of a message in CDR: how it is laid out.
+/// Length of the header of a CDR message, which states its byte order.
 const HEAD: usize = 4;
 
-/// Takes a message apart. No list is longer than what is left of its bytes.
+/// Decodes a message. Allocations are bounded by the message's size.
 pub(super) struct Decoder<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -22,10 +22,12 @@ impl<'a> Decoder<'a> {
             (Encoding::Cdr, [0, kind @ (0 | 1), _, _, content @ ..]) => (content, *kind == 0),
             (Encoding::Cdr, [a, b, _, _, ..]) => {
                 return Err(
-                    format!("is laid out in way {a:#04x} {b:#04x}, which is not the CDR of ROS 2").into()
+                    format!("has the encapsulation {a:#04x} {b:#04x}, which is not ROS 2's CDR").into()
                 );
             }
-            (Encoding::Cdr, bytes) => return Err(format!("has {} of at least 4 bytes", bytes.len()).into()),
+            (Encoding::Cdr, bytes) => {
+                return Err(format!("has {} bytes, but at least 4 are needed", bytes.len()).into());
+            }
         };
         Ok(Self { bytes, at: 0, encoding, highest_first })
     }
@@ -33,13 +35,13 @@ impl<'a> Decoder<'a> {
     fn take(&mut self, count: usize) -> Result<&'a [u8]> {
         let left = &self.bytes[self.at.min(self.bytes.len())..];
         let Some(taken) = left.get(..count) else {
-            return Err(format!("ends early: {count} bytes are to follow and {} do", left.len()).into());
+            return Err(format!("ends early: {count} bytes should follow, but only {} do", left.len()).into());
         };
         self.at += count;
         Ok(taken)
     }
 
-    /// A number of `N` bytes, lowest first.
+    /// A number of `N` bytes, least significant first.
     fn number<const N: usize>(&mut self) -> Result<[u8; N]> {
         if self.encoding == Encoding::Cdr {
             self.at = self.at.next_multiple_of(N);
@@ -74,7 +76,7 @@ impl<'a> Decoder<'a> {
 
     pub(super) fn doubles(&mut self) -> Result<Vec<f64>> {
         let count = self.u32()?;
-        // It grows with what is there, not with what is claimed.
+        // Grows with the actual data, not the claimed count.
         (0..count).map(|_| self.double()).collect()
     }
 
@@ -86,13 +88,13 @@ impl<'a> Decoder<'a> {
 
     pub(super) fn string(&mut self) -> Result<Cow<'a, str>> {
         let bytes = self.list()?;
-        // ROS 2 counts the 0 at its end.
+        // ROS 2 includes the terminating 0.
         let text =
             if self.encoding == Encoding::Cdr { bytes.strip_suffix(&[0]).unwrap_or(bytes) } else { bytes };
         Ok(String::from_utf8_lossy(text))
     }
 
-    /// The time of a header, behind what ROS 1 has before it.
+    /// The time of a header, after the sequence number of ROS 1.
     pub(super) fn stamp(&mut self) -> Result<Stamp> {
         let seconds = if self.encoding == Encoding::Ros1 {
             let _sequence = self.u32()?;
@@ -104,13 +106,13 @@ impl<'a> Decoder<'a> {
     }
 }
 
-/// Puts a message together, in CDR with the lowest byte first.
+/// Encodes a message as little-endian CDR.
 pub(super) struct Encoder {
     bytes: Vec<u8>,
 }
 
 impl Encoder {
-    /// Of a message with so many bytes of data, beside its other fields.
+    /// An encoder with capacity for this many bytes of data and the other fields.
     pub(super) fn with_room_for(data: usize) -> Self {
         let mut bytes = Vec::with_capacity(data + 512);
         bytes.extend([0, 1, 0, 0]);
@@ -146,7 +148,7 @@ impl Encoder {
         self.bytes.extend(bytes);
     }
 
-    /// Bytes whose number is known.
+    /// Bytes of fixed length.
     pub(super) fn array(&mut self, bytes: &[u8]) {
         self.bytes.extend(bytes);
     }

@@ -1,4 +1,4 @@
-//! The definitions of the messages that are written, as recordings hold them beside the messages.
+//! Definitions of the written message types, which recordings store with the messages.
 
 use std::fmt::Write as _;
 
@@ -18,7 +18,7 @@ const FIELD: &str = "uint8 INT8=1\nuint8 UINT8=2\nuint8 INT16=3\nuint8 UINT16=4\
 const POINTS: &str = "std_msgs/Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\n\
                       bool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n";
 
-/// Each type with its definition, and the types that it takes beside those of a header.
+/// Each type with its definition, and the types it contains besides those of a header.
 const ALL: [(&str, &str, &[&str]); 4] = [
     ("sensor_msgs/msg/Image", IMAGE, &[]),
     ("sensor_msgs/msg/CameraInfo", CAMERA_INFO, &["sensor_msgs/RegionOfInterest"]),
@@ -34,8 +34,8 @@ const PARTS: [(&str, &str); 5] = [
     ("sensor_msgs/PointField", FIELD),
 ];
 
-/// The definition of a type that is written, such as `sensor_msgs/msg/Image`, and those of all types in it, as `ros2msg` has them.
-/// Empty for any other type.
+/// The definition of a written type such as `sensor_msgs/msg/Image` and of all types in it, in the format `ros2msg`. Empty for any other
+/// type.
 #[must_use]
 pub fn definition(name: &str) -> String {
     let Some((_, own, more)) = ALL.iter().find(|row| row.0 == name) else { return String::new() };

@@ -1,15 +1,15 @@
-//! The message by which tools of ROS 2, such as `ros2 node list`, know nodes.
+//! The message that announces nodes to ROS 2 tools such as `ros2 node list`.
 
 use super::bytes::Encoder;
 use super::types::{Encode, Type};
 
-/// What identifies a reader, a writer or a member of a domain: 16 bytes, and up to ROS 2 Humble 24.
+/// Identifies a reader, a writer or a participant: 16 bytes, or 24 up to ROS 2 Humble.
 pub type Gid = Vec<u8>;
 
-/// `rmw_dds_common/msg/ParticipantEntitiesInfo`, the nodes of a member of a domain.
+/// `rmw_dds_common/msg/ParticipantEntitiesInfo`, the nodes of a participant.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ParticipantEntitiesInfo {
-    /// The member.
+    /// The participant.
     pub gid: Gid,
     /// Its nodes.
     pub nodes: Vec<NodeEntitiesInfo>,
@@ -18,13 +18,13 @@ pub struct ParticipantEntitiesInfo {
 /// `rmw_dds_common/msg/NodeEntitiesInfo`, a node.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct NodeEntitiesInfo {
-    /// Its namespace, with a slash at its beginning.
+    /// The namespace, with leading slash.
     pub namespace: String,
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// What it subscribes with.
+    /// The readers of its subscriptions.
     pub readers: Vec<Gid>,
-    /// What it publishes with.
+    /// The writers of its publications.
     pub writers: Vec<Gid>,
 }
 

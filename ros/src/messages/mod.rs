@@ -1,6 +1,6 @@
-//! The messages of ROS that hold images, calibrations, disparities and points.
+//! ROS messages with images, calibrations, disparities and points.
 //!
-//! They are decoded from the bytes of ROS 2 (CDR, of either byte order) and of ROS 1, and encoded as CDR.
+//! They are decoded from CDR of ROS 2 (either byte order) and from ROS 1, and encoded as CDR.
 
 mod basics;
 mod bytes;

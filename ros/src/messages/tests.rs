@@ -1,15 +1,15 @@
 use super::*;
 
-/// An image of 2 x 1 pixels as ROS 2 lays it out, put down byte by byte; `order` gives each number its bytes.
+/// An image of 2 x 1 pixels in ROS 2's serialization, written byte by byte; `order` serializes a number.
 fn image_bytes(kind: u8, order: fn(u32) -> [u8; 4]) -> Vec<u8> {
     let mut bytes = vec![0, kind, 0, 0];
     for v in [7, 500_000_000, 5] {
         bytes.extend(order(v));
     }
-    // A text with its 0, and what fills up to a multiple of four.
+    // A text with its 0, padded to a multiple of four.
     bytes.extend(b"left\0\0\0\0");
     bytes.extend([1, 2, 6].map(order).concat());
-    // Its 0, that of is_bigendian, and one that fills up.
+    // The terminating 0, is_bigendian, and a byte of padding.
     bytes.extend(b"mono8\0\0\0");
     bytes.extend([2, 2].map(order).concat());
     bytes.extend([11, 22]);
@@ -31,9 +31,9 @@ fn images_are_read_in_either_byte_order() {
     assert_eq!(Image::decode(&lowest, Encoding::Cdr).unwrap(), image);
     assert_eq!(Image::decode(&image_bytes(0, u32::to_be_bytes), Encoding::Cdr).unwrap(), image);
     assert_eq!(image.encode(), lowest);
-    // Control: the order counts.
+    // Control: the byte order matters.
     assert!(Image::decode(&image_bytes(0, u32::to_le_bytes), Encoding::Cdr).is_err());
-    // ROS 1 fills nothing up, counts its headers, and ends no text.
+    // ROS 1 has no padding, a sequence number, and no terminating 0.
     let mut old = [9_u32, 7, 500_000_000, 4].map(u32::to_le_bytes).concat();
     old.extend(b"left");
     old.extend([1_u32, 2, 5].map(u32::to_le_bytes).concat());
@@ -45,23 +45,23 @@ fn images_are_read_in_either_byte_order() {
 }
 
 #[test]
-fn what_ends_early_is_refused() {
+fn truncated_messages_are_refused() {
     let whole = image_bytes(1, u32::to_le_bytes);
     for length in 0..whole.len() {
         assert!(Image::decode(&whole[..length], Encoding::Cdr).is_err(), "{length}");
     }
-    // A list that claims 4 GiB takes no memory.
+    // A list that claims 4 GiB allocates nothing.
     let mut huge = whole;
     let at = huge.len() - 6;
     huge[at..at + 4].copy_from_slice(&[0xff; 4]);
     let said = Image::decode(&huge, Encoding::Cdr).unwrap_err().to_string();
-    assert_eq!(said, "ends early: 4294967295 bytes are to follow and 2 do");
+    assert_eq!(said, "ends early: 4294967295 bytes should follow, but only 2 do");
     let said = Image::decode(&[0, 9, 0, 0, 1], Encoding::Cdr).unwrap_err().to_string();
     assert!(said.contains("0x00 0x09"), "{said}");
 }
 
 #[test]
-fn calibrations_come_back_and_are_those_of_a_file() {
+fn calibrations_round_trip_and_equal_those_of_files() {
     let info = CameraInfo {
         header: Header { stamp: Stamp(1), frame_id: "right".into() },
         height: 480,
@@ -83,14 +83,14 @@ fn calibrations_come_back_and_are_those_of_a_file() {
     assert_eq!(read.size, Some((640, 480)));
     let views = read.views.unwrap();
     assert_eq!((views.translation, views.cameras[0].focal_length), ([-0.12, 0.0], [500.0, 500.0]));
-    // A rectified view has the same projection, and no lens.
+    // A rectified view has the same projection and no distortion.
     let view = info.of_rectified();
     assert_eq!((view.k[0], &view.d[..], view.p), (500.0, &[0.0; 5][..], info.p));
 }
 
-/// As Cyclone DDS lays it out: identifiers stand where the last text ends, and only numbers are filled up to.
+/// As serialized by Cyclone DDS: identifiers follow texts directly, only numbers are aligned.
 #[test]
-fn nodes_are_told_as_ros_has_it() {
+fn nodes_are_announced_as_in_ros() {
     let node = NodeEntitiesInfo {
         namespace: "/".into(),
         name: "eye".into(),
@@ -131,7 +131,7 @@ fn times_have_nine_decimals() {
 }
 
 #[test]
-fn every_type_that_is_written_has_its_definition() {
+fn every_written_type_has_a_definition() {
     for name in [Image::NAME, CameraInfo::NAME, DisparityImage::NAME, PointCloud2::NAME] {
         let text = definition(name);
         assert!(

@@ -1,4 +1,4 @@
-//! The types of messages.
+//! Message types.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -6,10 +6,10 @@ use std::fmt::Write as _;
 use super::basics::{Encoding, Result, Stamp};
 use super::bytes::{Decoder, Encoder};
 
-/// When and in which frame of coordinates something was seen.
+/// The time and the coordinate frame of an observation.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Header {
-    /// When.
+    /// The time.
     pub stamp: Stamp,
     /// The name of the frame.
     pub frame_id: String,
@@ -18,17 +18,17 @@ pub struct Header {
 /// `sensor_msgs/msg/Image`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Image<'a> {
-    /// Its time and camera.
+    /// Time and camera.
     pub header: Header,
     /// Rows.
     pub height: u32,
     /// Columns.
     pub width: u32,
-    /// What a pixel holds, such as `mono8`.
+    /// The pixel encoding, such as `mono8`.
     pub encoding: Cow<'a, str>,
-    /// Whether samples of more than a byte begin with the highest one.
+    /// Whether samples of more than one byte are big-endian.
     pub is_bigendian: bool,
-    /// Bytes from a row to the next.
+    /// Bytes from one row to the next.
     pub step: u32,
     /// The rows.
     pub data: Cow<'a, [u8]>,
@@ -37,20 +37,20 @@ pub struct Image<'a> {
 /// `sensor_msgs/msg/CompressedImage`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CompressedImage<'a> {
-    /// Its time and camera.
+    /// Time and camera.
     pub header: Header,
-    /// `jpeg`, `png`, or what `image_transport` writes, such as `bgr8; jpeg compressed bgr8`.
+    /// `jpeg`, `png`, or a format of `image_transport`, such as `bgr8; jpeg compressed bgr8`.
     pub format: Cow<'a, str>,
-    /// A file of that format.
+    /// A file in that format.
     pub data: Cow<'a, [u8]>,
 }
 
-/// `sensor_msgs/msg/RegionOfInterest`, in pixels of the sensor. All 0 is all of it.
+/// `sensor_msgs/msg/RegionOfInterest`, in sensor pixels. All 0 means the whole sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RegionOfInterest {
-    /// Its first column.
+    /// First column.
     pub x_offset: u32,
-    /// Its first row.
+    /// First row.
     pub y_offset: u32,
     /// Rows.
     pub height: u32,
@@ -63,7 +63,7 @@ pub struct RegionOfInterest {
 /// `sensor_msgs/msg/CameraInfo`, a camera of a calibrated pair.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CameraInfo {
-    /// Its time and camera.
+    /// Time and camera.
     pub header: Header,
     /// Rows of the sensor.
     pub height: u32,
@@ -71,34 +71,34 @@ pub struct CameraInfo {
     pub width: u32,
     /// `plumb_bob`, `rational_polynomial` or `equidistant`.
     pub distortion_model: String,
-    /// The coefficients of the lens.
+    /// Distortion coefficients.
     pub d: Vec<f64>,
-    /// The matrix of the camera, row by row.
+    /// The camera matrix, row by row.
     pub k: [f64; 9],
-    /// The rotation from its frame to that of the rectified view.
+    /// The rotation from the camera's frame to the rectified frame.
     pub r: [f64; 9],
-    /// The projection of the rectified view, a matrix of 3 x 4.
+    /// The 3 x 4 projection of the rectified view, row by row.
     pub p: [f64; 12],
-    /// How many columns are one of the image; 0 is 1.
+    /// Sensor columns per image column; 0 means 1.
     pub binning_x: u32,
-    /// How many rows are one of the image; 0 is 1.
+    /// Sensor rows per image row; 0 means 1.
     pub binning_y: u32,
-    /// What of the sensor is read out.
+    /// The region of the sensor that is read out.
     pub roi: RegionOfInterest,
 }
 
-/// `stereo_msgs/msg/DisparityImage`. A pixel below `min_disparity` is invalid.
+/// `stereo_msgs/msg/DisparityImage`. Pixels below `min_disparity` are invalid.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DisparityImage<'a> {
-    /// That of the left image.
+    /// The header of the left image.
     pub header: Header,
-    /// The disparities in pixels, as `32FC1`: such that Z = f t / d.
+    /// The disparities in pixels, as `32FC1`, with Z = f t / d.
     pub image: Image<'a>,
     /// Focal length in pixels.
     pub f: f32,
-    /// Distance of the cameras in metres.
+    /// Baseline in metres.
     pub t: f32,
-    /// Where a pixel may have a disparity.
+    /// The region in which pixels may have a disparity.
     pub valid_window: RegionOfInterest,
     /// Smallest disparity that was searched.
     pub min_disparity: f32,
@@ -108,44 +108,44 @@ pub struct DisparityImage<'a> {
     pub delta_d: f32,
 }
 
-/// A number of each point of a cloud.
+/// A field of the points of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PointField {
-    /// Its name.
+    /// The name.
     pub name: &'static str,
-    /// Where it is in a point, in bytes.
+    /// Offset within a point, in bytes.
     pub offset: u32,
-    /// Its type: [`UINT8`] or [`FLOAT32`].
+    /// The type: [`UINT8`] or [`FLOAT32`].
     pub datatype: u8,
 }
 
-/// The type of a field that is a byte.
+/// The type of a byte field.
 pub const UINT8: u8 = 2;
-/// The type of a field that is a float.
+/// The type of a float field.
 pub const FLOAT32: u8 = 7;
 
-/// `sensor_msgs/msg/PointCloud2`, a list of points, all of which are finite.
+/// `sensor_msgs/msg/PointCloud2`, a list of finite points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloud2 {
-    /// That of the left image.
+    /// The header of the left image.
     pub header: Header,
-    /// What a point holds.
+    /// The fields of a point.
     pub fields: Vec<PointField>,
-    /// Bytes of a point.
+    /// Bytes per point.
     pub point_step: u32,
     /// The points.
     pub data: Vec<u8>,
 }
 
-/// A type of messages.
+/// A message type.
 pub trait Type {
-    /// Its name, such as `sensor_msgs/msg/Image`.
+    /// The name, such as `sensor_msgs/msg/Image`.
     const NAME: &'static str;
 }
 
-/// A message that is written.
+/// A message that can be written.
 pub trait Encode: Type {
-    /// Its bytes in CDR, lowest byte first.
+    /// Encodes the message as little-endian CDR.
     fn encode(&self) -> Vec<u8>;
 }
 
@@ -175,20 +175,20 @@ impl Header {
         to.string(&self.frame_id);
     }
 
-    /// The header with which the bytes of any message begin that has one.
+    /// Decodes the header at the start of any message that has one.
     ///
     /// # Errors
-    /// Where the bytes end before.
+    /// If the bytes end early.
     pub fn of(bytes: &[u8], encoding: Encoding) -> Result<Self> {
         Self::decode(&mut Decoder::new(bytes, encoding)?)
     }
 }
 
 impl<'a> Image<'a> {
-    /// The message in `bytes`, whose pixels are borrowed.
+    /// Decodes the message; its pixels are borrowed.
     ///
     /// # Errors
-    /// Where the bytes are no such message.
+    /// If the bytes are not such a message.
     pub fn decode(bytes: &'a [u8], encoding: Encoding) -> Result<Self> {
         let from = &mut Decoder::new(bytes, encoding)?;
         Ok(Self {
@@ -222,10 +222,10 @@ impl Encode for Image<'_> {
 }
 
 impl<'a> CompressedImage<'a> {
-    /// The message in `bytes`, whose file is borrowed.
+    /// Decodes the message; its file is borrowed.
     ///
     /// # Errors
-    /// Where the bytes are no such message.
+    /// If the bytes are not such a message.
     pub fn decode(bytes: &'a [u8], encoding: Encoding) -> Result<Self> {
         let from = &mut Decoder::new(bytes, encoding)?;
         Ok(Self { header: Header::decode(from)?, format: from.string()?, data: Cow::Borrowed(from.list()?) })
@@ -247,10 +247,10 @@ impl RegionOfInterest {
 }
 
 impl CameraInfo {
-    /// The message in `bytes`.
+    /// Decodes the message.
     ///
     /// # Errors
-    /// Where the bytes are no such message.
+    /// If the bytes are not such a message.
     pub fn decode(bytes: &[u8], encoding: Encoding) -> Result<Self> {
         let from = &mut Decoder::new(bytes, encoding)?;
         Ok(Self {
@@ -268,19 +268,19 @@ impl CameraInfo {
         })
     }
 
-    /// Whether it says a camera at all: that of one without a calibration is 0.
+    /// Whether it contains a calibration; uncalibrated cameras send zeros.
     #[must_use]
     pub fn is_calibrated(&self) -> bool {
         self.k[0] != 0.0
     }
 
-    /// The same in the words of a file of ROS's `camera_calibration`, which
-    /// [`calibration::of_texts`](mrfgs::calibration::of_texts) takes together with that of the other camera.
+    /// The camera as a file of ROS's `camera_calibration`, which [`calibration::of_texts`](mrfgs::calibration::of_texts) reads together
+    /// with the other camera's.
     #[must_use]
     pub fn text(&self) -> String {
         let Self { height, width, distortion_model, d, k, r, p, binning_x, binning_y, roi, .. } = self;
         let mut text = format!("image_width: {width}\nimage_height: {height}\n");
-        // Older drivers leave the name of the usual model out.
+        // Older drivers omit the name of the usual model.
         if !distortion_model.is_empty() {
             let _ = writeln!(text, "distortion_model: {distortion_model:?}");
         }
@@ -302,7 +302,7 @@ impl CameraInfo {
         text
     }
 
-    /// That of the rectified view: a camera without distortion, whose projection is the same.
+    /// The rectified camera: without distortion, and with the same projection.
     #[must_use]
     pub fn of_rectified(&self) -> Self {
         let p = &self.p;
@@ -355,7 +355,7 @@ impl Encode for PointCloud2 {
         let count = self.data.len() as u32 / self.point_step.max(1);
         let mut to = Encoder::with_room_for(self.data.len());
         self.header.encode(&mut to);
-        // One row: the points are in no grid.
+        // A single row, as the points are unordered.
         to.u32(1);
         to.u32(count);
         to.u32(self.fields.len() as u32);

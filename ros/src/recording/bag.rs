@@ -1,5 +1,4 @@
-//! Bags of ROS 1, from their start to their end. (The crate `rosbag` maps the whole file, takes lengths on trust, and panics where a bag
-//! was not closed.)
+//! Reads ROS 1 bags from start to end. (The crate `rosbag` maps the whole file, trusts lengths, and panics on bags that were not closed.)
 
 use std::collections::HashMap;
 use std::mem;
@@ -14,24 +13,24 @@ use super::place::Place;
 use crate::messages::Encoding;
 use crate::topics::Topic;
 
-/// How such a file begins.
+/// The first bytes of a bag.
 pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 
-/// The kinds of records that count here, in the field `op`.
+/// The relevant kinds of records, in the field `op`.
 const MESSAGE: u8 = 2;
 const BAG: u8 = 3;
 const CHUNK: u8 = 5;
 const CONNECTION: u8 = 7;
 
-/// A file that is being read.
+/// A bag being read.
 pub(super) struct Bag {
     file: File,
     wanted: Vec<String>,
-    /// The topic of each connection: among all, and among those that are wanted.
+    /// The topic of each connection: its index among all topics, and among the requested ones.
     connections: HashMap<u32, (usize, Option<usize>)>,
     topics: Vec<Topic>,
     chunk: Chunk,
-    /// Where the messages end and the index begins; 0 where the bag was not closed.
+    /// The end of the messages and start of the index; 0 if the bag was not closed.
     index: u64,
 }
 
@@ -39,7 +38,7 @@ impl Bag {
     pub(super) fn open(place: &Place, wanted: Vec<String>) -> Result<Self> {
         let mut file = File::open(place)?;
         if file.left() < MAGIC.len() as u64 || file.take(MAGIC.len() as u64)? != MAGIC {
-            return Err(file.error("is no bag of ROS 1: it does not begin with #ROSBAG V2.0"));
+            return Err(file.error("is not a ROS 1 bag: it does not start with #ROSBAG V2.0"));
         }
         let mut bag = Self {
             file,
@@ -53,7 +52,7 @@ impl Bag {
         let _padding = bag.part()?;
         let fields = Fields::of(&head).map_err(|reason| bag.file.error(reason))?;
         if fields.kind() != Some(BAG) {
-            return Err(bag.file.error("is a damaged bag: it does not begin with its header"));
+            return Err(bag.file.error("is a damaged bag: it does not start with its header"));
         }
         bag.index = fields.get("index_pos").map_or(0, number);
         Ok(bag)
@@ -66,7 +65,7 @@ impl Bag {
             return Ok(bag.topics);
         }
         let mut bag = Self::open(place, Vec::new())?;
-        // Damage is told when the messages are read: what lies before it counts.
+        // Damage is reported when messages are read; everything before it is usable.
         match damage(&mut bag) {
             Some(error) if bag.topics.is_empty() => Err(error),
             _ => Ok(bag.topics),
@@ -82,23 +81,26 @@ impl Bag {
         Ok(())
     }
 
-    /// What stands behind its length.
+    /// Reads a length and the bytes after it.
     fn part(&mut self) -> Result<Vec<u8>> {
         let length = number(&self.file.take(4)?);
         self.file.take(length)
     }
 
-    /// Takes a record that is no chunk. Returns the message, if it is one of a topic that is wanted.
+    /// Handles a record other than a chunk. Returns its message, if that is on a requested topic.
     fn put(&mut self, head: &[u8], body: &[u8]) -> Result<Option<Message>, Reason> {
         let fields = Fields::of(head)?;
-        let connection =
-            || fields.get("conn").map(|id| number(id) as u32).ok_or("has a record without its connection");
+        let connection = || {
+            fields.get("conn").map(|id| number(id) as u32).ok_or("contains a record without its connection")
+        };
         match fields.kind() {
             Some(CONNECTION) => {
                 let id = connection()?;
                 let more = Fields::of(body)?;
-                let name =
-                    fields.get("topic").or(more.get("topic")).ok_or("has a connection without a topic")?;
+                let name = fields
+                    .get("topic")
+                    .or(more.get("topic"))
+                    .ok_or("contains a connection without a topic")?;
                 let name = String::from_utf8_lossy(name).into_owned();
                 let kind = String::from_utf8_lossy(more.get("type").unwrap_or_default());
                 let wanted = self.wanted.iter().position(|one| *one == name);
@@ -113,9 +115,7 @@ impl Bag {
             Some(MESSAGE) => {
                 let id = connection()?;
                 let Some((_, wanted)) = self.connections.get(&id) else {
-                    return Err(
-                        format!("has a message of connection {id}, which it does not describe").into()
-                    );
+                    return Err(format!("contains a message of the undefined connection {id}").into());
                 };
                 let message = |topic| Message { topic, encoding: Encoding::Ros1, data: body.to_vec() };
                 Ok(wanted.map(message))
@@ -143,7 +143,7 @@ impl Source for Bag {
             }
             if self.file.left() == 0 {
                 return Err(self.file.error(
-                    "is cut off: it has no index, as of a bag that was not closed; what is whole before it counts",
+                    "is cut off: it has no index, so it was probably not closed; complete messages are used",
                 ));
             }
             let (head, body) = (self.part()?, self.part()?);
@@ -168,7 +168,7 @@ fn unpacked_chunk(head: &[u8], body: &[u8]) -> Result<Vec<u8>, Reason> {
     unpacked(body, &method, size)
 }
 
-/// The record at byte `at`: its head, its body, and where the next one begins.
+/// The record at byte `at`: its head, its body, and the start of the next one.
 fn record(bytes: &[u8], at: usize) -> Result<(&[u8], &[u8], usize), Reason> {
     let part = |at: usize| {
         let length = number(bytes.get(at..at.checked_add(4)?)?) as usize;
@@ -179,7 +179,7 @@ fn record(bytes: &[u8], at: usize) -> Result<(&[u8], &[u8], usize), Reason> {
     whole.ok_or_else(|| "ends in the middle of a record".into())
 }
 
-/// The fields of a head: `name=value`, each behind its length.
+/// The fields of a head: `name=value`, each preceded by its length.
 struct Fields<'a>(Vec<(&'a [u8], &'a [u8])>);
 
 impl<'a> Fields<'a> {
@@ -189,11 +189,11 @@ impl<'a> Fields<'a> {
             let field = rest
                 .split_at_checked(4)
                 .and_then(|(length, rest)| rest.split_at_checked(number(length) as usize));
-            let (field, after) = field.ok_or("has a damaged record: a field of it has no end")?;
+            let (field, after) = field.ok_or("contains a damaged record: a field has no end")?;
             let equals = field
                 .iter()
                 .position(|byte| *byte == b'=')
-                .ok_or("has a damaged record: a field of it has no name")?;
+                .ok_or("contains a damaged record: a field has no name")?;
             fields.push((&field[..equals], &field[equals + 1..]));
             rest = after;
         }
@@ -209,7 +209,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// A number of up to eight bytes, lowest first.
+/// A little-endian number of up to eight bytes.
 fn number(bytes: &[u8]) -> u64 {
     bytes.iter().take(8).rev().fold(0, |all, byte| all << 8 | u64::from(*byte))
 }

@@ -1,4 +1,4 @@
-//! The packed parts of recordings.
+//! The compressed parts of recordings.
 
 use std::io::Read;
 
@@ -12,13 +12,13 @@ use super::message::Message;
 use super::place::ZSTD;
 use crate::messages::Encoding;
 
-/// The records of a chunk, which are taken one by one.
+/// The records of a chunk, consumed one by one.
 #[derive(Default)]
 pub(super) struct Chunk {
     records: Vec<u8>,
-    /// How far they have been taken.
+    /// The position of the next record.
     at: usize,
-    /// Where the chunk begins in the file.
+    /// The offset of the chunk in the file.
     start: u64,
 }
 
@@ -27,10 +27,10 @@ impl Chunk {
         Self { records, at: 0, start }
     }
 
-    /// The next message. `take` takes the record at a byte of the chunk, and says where the next one begins.
+    /// The next message. `take` handles the record at a position and returns the start of the next one.
     ///
     /// # Errors
-    /// Those of `take`, in words that go after the name of the file.
+    /// Errors of `take`, worded to follow the file name.
     pub(super) fn message(
         &mut self,
         mut take: impl FnMut(&[u8], usize) -> Result<(Option<Message>, usize), Reason>,
@@ -48,13 +48,13 @@ impl Chunk {
     }
 }
 
-/// What is in `packed`, which claims to hold `size` bytes and is packed by the method of this name.
+/// Decompresses `packed` with the named method to the claimed `size` in bytes.
 ///
 /// # Errors
-/// Where it is not so, in words that go after the name of the file.
+/// If that fails, worded to follow the file name.
 pub(super) fn unpacked(packed: &[u8], method: &str, size: u64) -> Result<Vec<u8>, Reason> {
     if size > MAX_RECORD {
-        return Err(format!("claims {size} bytes, and at most {MAX_RECORD} are unpacked at once").into());
+        return Err(format!("claims {size} bytes, but at most {MAX_RECORD} are decompressed at once").into());
     }
     let mut bytes = Vec::new();
     let read = match method {
@@ -63,47 +63,48 @@ pub(super) fn unpacked(packed: &[u8], method: &str, size: u64) -> Result<Vec<u8>
         "bz2" => BzDecoder::new(packed).take(size + 1).read_to_end(&mut bytes),
         "zstd" => match StreamingDecoder::new(packed) {
             Ok(from) => from.take(size + 1).read_to_end(&mut bytes),
-            Err(error) => return Err(format!("is no zstd: {error}").into()),
+            Err(error) => return Err(format!("is not zstd: {error}").into()),
         },
         other => {
             let other: String = other.chars().filter(|c| !c.is_control()).take(20).collect();
-            return Err(format!("is packed by `{other}`; zstd, lz4, bz2 and none are read").into());
+            return Err(
+                format!("is compressed by `{other}`; only zstd, lz4, bz2 and none are supported").into()
+            );
         }
     };
     match read {
         Ok(count) if count as u64 == size => Ok(bytes),
         Ok(count) if (count as u64) < size => {
-            Err(format!("is damaged: it holds {count} bytes and claims {size}").into())
+            Err(format!("is damaged: it contains {count} bytes but claims {size}").into())
         }
-        Ok(_) => Err(format!("is damaged: it holds more than the {size} bytes that it claims").into()),
+        Ok(_) => Err(format!("is damaged: it contains more than the claimed {size} bytes").into()),
         Err(error) => Err(format!("is damaged: {}", error.to_string().replace('\n', " ")).into()),
     }
 }
 
-/// The bytes of a message, unpacked where it is packed by itself.
+/// The bytes of a message, decompressed if it is individually compressed.
 ///
 /// # Errors
-/// Where nothing can be unpacked, in words that go after the name of the message.
+/// If decompression fails, worded to follow the name of the message.
 pub(super) fn plain(bytes: &[u8], encoding: Encoding) -> Result<Vec<u8>, Reason> {
-    // None in CDR begins so.
+    // No CDR message starts with these bytes.
     let is_packed = encoding == Encoding::Cdr && bytes.starts_with(ZSTD);
     if is_packed { unpacked_alone(bytes) } else { Ok(bytes.to_vec()) }
 }
 
-/// What is in a message of its own that is packed by Zstandard.
+/// Decompresses a message that is individually compressed by Zstandard.
 ///
 /// # Errors
-/// Where nothing can be unpacked, in words that go after the name of the message.
+/// If decompression fails, worded to follow the name of the message.
 pub(super) fn unpacked_alone(packed: &[u8]) -> Result<Vec<u8>, Reason> {
     let mut bytes = Vec::new();
-    let from = StreamingDecoder::new(packed).map_err(|error| format!("is no zstd: {error}"))?;
+    let from = StreamingDecoder::new(packed).map_err(|error| format!("is not zstd: {error}"))?;
     let read = from.take(MAX_RECORD + 1).read_to_end(&mut bytes);
     read.map_err(|error| format!("is damaged: {}", error.to_string().replace('\n', " ")))?;
     if bytes.len() as u64 > MAX_RECORD {
-        return Err(format!(
-            "holds more than {MAX_RECORD} bytes, which is the most that is unpacked at once"
-        )
-        .into());
+        return Err(
+            format!("contains more than {MAX_RECORD} bytes, the most that is decompressed at once").into()
+        );
     }
     Ok(bytes)
 }

@@ -1,4 +1,4 @@
-//! Bags of ROS 2 in SQLite, in the order in which they were recorded.
+//! Reads ROS 2 bags in SQLite, in the order of recording.
 
 use std::collections::HashMap;
 
@@ -12,13 +12,13 @@ use super::sqlite::{Database, Rows, Table, Value};
 use crate::messages::Encoding;
 use crate::topics::Topic;
 
-/// A file that is being read.
+/// A bag being read.
 pub(super) struct Db3 {
     database: Database,
     rows: Rows,
-    /// Which columns of the messages hold their topics and their bytes.
+    /// The columns of the messages with topic and data.
     columns: [usize; 2],
-    /// By the numbers of the topics: which of those that are wanted it is, and how its messages are laid out.
+    /// By topic id: the index among the requested topics, and the serialization.
     wanted: HashMap<i64, (usize, Encoding)>,
 }
 
@@ -38,7 +38,7 @@ impl Db3 {
     pub(super) fn topics(place: &Place) -> Result<Vec<Topic>> {
         let mut database = Database::open(place)?;
         let topics = all_topics(&mut database)?;
-        // Damage is told when the messages are read: what lies before it counts.
+        // Damage is reported when messages are read; everything before it is usable.
         let counts = counts(&mut database).ok();
         let counted = |(id, topic)| {
             let count = counts.as_ref().map(|counts| counts.get(&id).copied().unwrap_or(0));
@@ -53,23 +53,25 @@ impl Source for Db3 {
         let [of, data] = self.columns;
         while let Some(row) = self.rows.next(&mut self.database)? {
             let Value::Integer(id) = row.value(of) else {
-                return Err(self.database.error(format!("has a message without a topic: row {}", row.id)));
+                return Err(self
+                    .database
+                    .error(format!("contains a message without a topic: row {}", row.id)));
             };
-            // Those of other topics are not read to their ends.
+            // Messages of other topics are not read completely.
             let Some(&(topic, encoding)) = self.wanted.get(&id) else { continue };
             let row = self.database.whole(row)?;
             let Value::Bytes(bytes) = row.value(data) else {
-                return Err(self.database.error(format!("has a message without bytes: row {}", row.id)));
+                return Err(self.database.error(format!("contains a message without data: row {}", row.id)));
             };
             let error =
-                |reason: Reason| self.database.error(format!("the message of row {} {reason}", row.id));
+                |reason: Reason| self.database.error(format!("the message in row {} {reason}", row.id));
             return Ok(Some(Message { topic, encoding, data: plain(bytes, encoding).map_err(error)? }));
         }
         Ok(None)
     }
 }
 
-/// The table called `name`, and where its `columns` are.
+/// The table called `name`, with the positions of its `columns`.
 fn table<const N: usize>(
     database: &mut Database,
     name: &str,
@@ -82,11 +84,11 @@ fn table<const N: usize>(
     });
     found.ok_or_else(|| {
         let columns = columns.join(" and ");
-        database.error(format!("is no bag of ROS 2: it has no table {name} with {columns}"))
+        database.error(format!("is not a ROS 2 bag: it has no table {name} with {columns}"))
     })
 }
 
-/// How many messages there are of each topic, by its number.
+/// The number of messages of each topic, by its id.
 fn counts(database: &mut Database) -> Result<HashMap<i64, u64>> {
     let (messages, [of]) = table(database, "messages", ["topic_id"])?;
     let (mut rows, mut counts) = (database.rows(&messages), HashMap::new());
@@ -98,7 +100,7 @@ fn counts(database: &mut Database) -> Result<HashMap<i64, u64>> {
     Ok(counts)
 }
 
-/// The topics with their numbers.
+/// The topics with their ids.
 fn all_topics(database: &mut Database) -> Result<Vec<(i64, Topic)>> {
     let (topics, columns) = table(database, "topics", ["name", "type", "serialization_format"])?;
     let mut rows = database.rows(&topics);

@@ -1,4 +1,4 @@
-//! Files whose records say how long they are, which need not be true.
+//! Files whose records state their lengths, perhaps wrongly.
 
 use std::fs;
 use std::io::{BufReader, Read};
@@ -12,7 +12,7 @@ use super::place::Place;
 /// The largest record that is read at once, in bytes.
 pub(super) const MAX_RECORD: u64 = 1 << 30;
 
-/// A file, and where it is being read.
+/// A file with the reading position.
 pub(super) struct File {
     path: PathBuf,
     from: BufReader<fs::File>,
@@ -49,12 +49,12 @@ impl File {
         Error::read(&self.path, reason.into())
     }
 
-    /// The next `count` bytes.
+    /// Reads the next `count` bytes.
     pub(super) fn take(&mut self, count: u64) -> Result<Vec<u8>> {
         self.check(count)?;
         if count > MAX_RECORD {
             return Err(self.error(format!(
-                "has a record of {count} bytes at byte {}, and at most {MAX_RECORD} are read at once",
+                "contains a record of {count} bytes at byte {}, but at most {MAX_RECORD} are read at once",
                 self.at
             )));
         }
@@ -65,7 +65,7 @@ impl File {
             self.from.by_ref().take(count).read_to_end(&mut bytes).map_err(|e| Error::read(&self.path, e))?;
         self.at += read as u64;
         if read as u64 != count {
-            return Err(self.error("became shorter while it was read"));
+            return Err(self.error("was truncated while it was read"));
         }
         Ok(bytes)
     }
@@ -79,20 +79,20 @@ impl File {
 
     pub(super) fn seek(&mut self, to: u64) -> Result<()> {
         let to = to.min(self.len);
-        // What is in the buffer already stays.
+        // Keeps the buffer for short distances.
         let way = to.cast_signed() - self.at.cast_signed();
         self.from.seek_relative(way).map_err(|e| Error::read(&self.path, e))?;
         self.at = to;
         Ok(())
     }
 
-    /// Refuses to go beyond the end.
+    /// Refuses to read beyond the end.
     fn check(&self, count: u64) -> Result<()> {
         if count <= self.left() {
             return Ok(());
         }
         Err(self.error(format!(
-            "is cut off: at byte {} of {} a record of {count} bytes begins; what is whole before it counts",
+            "is cut off: at byte {} of {} a record of {count} bytes starts; complete messages are used",
             self.at, self.len
         )))
     }

@@ -1,4 +1,4 @@
-//! MCAP files, from their start to their end.
+//! Reads MCAP files from start to end.
 
 use std::collections::HashMap;
 use std::mem;
@@ -15,12 +15,12 @@ use super::place::Place;
 use crate::messages::Encoding;
 use crate::topics::Topic;
 
-/// A record: its kind in one byte, its length in eight.
+/// Bytes before a record's body: its kind in one byte, its length in eight.
 const HEAD: u64 = 9;
-/// The last record: its head, two places and a checksum.
+/// Bytes of the last record: its head, two offsets and a checksum.
 const FOOTER: u64 = HEAD + 20;
 
-/// A file that is being read.
+/// A file being read.
 pub(super) struct Mcap {
     file: File,
     wanted: Vec<String>,
@@ -30,10 +30,10 @@ pub(super) struct Mcap {
     chunk: Chunk,
 }
 
-/// Where the messages of a channel belong.
+/// The topic of a channel.
 #[derive(Clone, Copy)]
 struct Channel {
-    /// Among all topics, and among those that are wanted.
+    /// Its index among all topics, and among the requested ones.
     topic: usize,
     wanted: Option<usize>,
     encoding: Option<Encoding>,
@@ -43,7 +43,7 @@ impl Mcap {
     pub(super) fn open(place: &Place, wanted: Vec<String>) -> Result<Self> {
         let mut file = File::open(place)?;
         if file.left() < MAGIC.len() as u64 || file.take(MAGIC.len() as u64)? != MAGIC {
-            return Err(file.error("is no MCAP file: it does not begin as one"));
+            return Err(file.error("is not an MCAP file: it does not start like one"));
         }
         Ok(Self {
             file,
@@ -62,14 +62,14 @@ impl Mcap {
             return Ok(topics);
         }
         let mut file = Self::open(place, Vec::new())?;
-        // Damage is told when the messages are read: what lies before it counts.
+        // Damage is reported when messages are read; everything before it is usable.
         match damage(&mut file) {
             Some(error) if file.topics.is_empty() => Err(error),
             _ => Ok(file.topics),
         }
     }
 
-    /// The topics by the summary at the end, where there is a whole one.
+    /// The topics from the summary at the end, if that is complete.
     fn summary(&mut self) -> Option<Vec<Topic>> {
         let end = self.file.len().checked_sub(FOOTER + MAGIC.len() as u64)?;
         self.file.seek(end).ok()?;
@@ -111,7 +111,7 @@ impl Mcap {
         (!topics.is_empty()).then_some(topics)
     }
 
-    /// Takes a record that is no chunk. Returns the message, if it is one of a topic that is wanted.
+    /// Handles a record other than a chunk. Returns its message, if that is on a requested topic.
     fn put(&mut self, kind: u8, body: &[u8]) -> Result<Option<Message>, Reason> {
         if ![op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&kind) {
             return Ok(None);
@@ -140,11 +140,9 @@ impl Mcap {
             }
             Ok(Record::Message { header, data }) => {
                 let Some(channel) = self.channels.get(&header.channel_id) else {
-                    return Err(format!(
-                        "has a message of channel {}, which it does not describe",
-                        header.channel_id
-                    )
-                    .into());
+                    return Err(
+                        format!("contains a message of the undefined channel {}", header.channel_id).into()
+                    );
                 };
                 if let Some(count) = &mut self.topics[channel.topic].count {
                     *count += 1;
@@ -152,11 +150,12 @@ impl Mcap {
                 let (Some(topic), Some(encoding)) = (channel.wanted, channel.encoding) else {
                     return Ok(None);
                 };
-                let data = plain(&data, encoding).map_err(|reason| format!("has a message that {reason}"))?;
+                let data =
+                    plain(&data, encoding).map_err(|reason| format!("contains a message that {reason}"))?;
                 Ok(Some(Message { topic, encoding, data }))
             }
             Ok(_) => Ok(None),
-            Err(reason) => Err(format!("has a damaged record: {reason}").into()),
+            Err(reason) => Err(format!("contains a damaged record: {reason}").into()),
         }
     }
 }
@@ -176,7 +175,7 @@ impl Source for Mcap {
             let start = self.file.at();
             if self.file.left() == 0 {
                 return Err(self.file.error(
-                    "is cut off: it has no end, as of a recording that was stopped by force; what is whole before it counts",
+                    "is cut off: it has no end, so the recording was probably killed; complete messages are used",
                 ));
             }
             let head = self.file.take(HEAD)?;
@@ -203,7 +202,7 @@ impl Source for Mcap {
     }
 }
 
-/// The records of a chunk, whose body this is.
+/// The records of a chunk with this body.
 fn unpacked_chunk(body: &[u8]) -> Result<Vec<u8>, Reason> {
     let (header, data) = match parsed(op::CHUNK, body) {
         Ok(Record::Chunk { header, data }) => (header, data),
@@ -211,29 +210,29 @@ fn unpacked_chunk(body: &[u8]) -> Result<Vec<u8>, Reason> {
         Err(reason) => return Err(format!("is damaged: {reason}").into()),
     };
     let records = unpacked(&data, &header.compression, header.uncompressed_size)?;
-    // 0 is none.
+    // 0 means no checksum.
     if header.uncompressed_crc != 0 && crc32fast::hash(&records) != header.uncompressed_crc {
-        return Err("is damaged: its checksum does not agree".into());
+        return Err("is damaged: its checksum is wrong".into());
     }
     Ok(records)
 }
 
-/// A record of this kind. The parser makes room for as long a text as the record claims, so that is checked before.
+/// Parses a record of this kind. The parser allocates the claimed length of a text, so texts are checked first.
 fn parsed(kind: u8, body: &[u8]) -> Result<Record<'_>, Reason> {
     if texts_fit(kind, body).is_none() {
-        return Err("a text in it has no end".into());
+        return Err("a text has no end".into());
     }
     mcap::parse_record(kind, body).map_err(|error| Reason::from(first_line(&error.to_string())))
 }
 
-/// Something where all texts of a record end within it.
+/// `Some` if all texts of a record end within it.
 fn texts_fit(kind: u8, body: &[u8]) -> Option<()> {
     let text = |rest: &mut &[u8]| {
         let (length, after) = rest.split_at_checked(4)?;
         *rest = after.get(number(length) as usize..)?;
         Some(())
     };
-    // What stands before the first one, and how many there are.
+    // The offset of the first text, and the number of texts.
     let (start, count) = match kind {
         op::SCHEMA => (2, 2),
         op::CHANNEL => (4, 2),
@@ -245,7 +244,7 @@ fn texts_fit(kind: u8, body: &[u8]) -> Option<()> {
         text(&mut rest)?;
     }
     if kind == op::CHANNEL {
-        // Pairs of texts behind the bytes that they take.
+        // Pairs of texts, preceded by their total length.
         let (length, after) = rest.split_at_checked(4)?;
         let mut pairs = after.get(..number(length) as usize)?;
         while !pairs.is_empty() {
@@ -256,7 +255,7 @@ fn texts_fit(kind: u8, body: &[u8]) -> Option<()> {
     Some(())
 }
 
-/// The record at byte `at`: its kind, its body, and where the next one begins.
+/// The record at byte `at`: its kind, its body, and the start of the next one.
 fn record(bytes: &[u8], at: usize) -> Result<(u8, &[u8], usize), Reason> {
     let ends = || Reason::from("ends in the middle of a record");
     let (head, rest) = bytes[at..].split_at_checked(HEAD as usize).ok_or_else(ends)?;
@@ -269,7 +268,7 @@ fn number(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |all, byte| all << 8 | u64::from(*byte))
 }
 
-/// Those of the parser go on for many lines.
+/// Errors of the parser have many lines.
 fn first_line(text: &str) -> &str {
     text.lines()
         .map(str::trim)

@@ -1,4 +1,4 @@
-//! What comes out of a recording.
+//! Messages of a recording.
 
 use std::iter;
 
@@ -7,18 +7,18 @@ use mrfgs::{Error, Result};
 use crate::messages::Encoding;
 use crate::topics::Topic;
 
-/// A message of a topic that was asked for.
+/// A message of a requested topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// Which of the topics that were asked for.
+    /// The index of its topic among the requested ones.
     pub topic: usize,
-    /// How it is laid out.
+    /// Its serialization.
     pub encoding: Encoding,
     /// Its bytes.
     pub data: Vec<u8>,
 }
 
-/// What reads the messages of a file.
+/// Reads the messages of a file.
 pub(super) trait Source {
     /// The next message; `None` after the last one.
     fn message(&mut self) -> Result<Option<Message>>;
@@ -37,7 +37,7 @@ pub(super) fn messages(mut source: impl Source) -> impl Iterator<Item = Result<M
     })
 }
 
-/// Reads a source to its end. Returns what is wrong with it.
+/// Reads a source to its end, and returns its error, if any.
 pub(super) fn damage(source: &mut impl Source) -> Option<Error> {
     loop {
         match source.message() {
@@ -48,7 +48,7 @@ pub(super) fn damage(source: &mut impl Source) -> Option<Error> {
     }
 }
 
-/// A topic that a file speaks of, whose type may be in the words of ROS 1.
+/// A topic in a file, whose type may be in ROS 1's notation.
 pub(super) fn topic(name: String, kind: &str, encoding: Option<Encoding>) -> Topic {
     let kind = match kind.split_once('/') {
         Some((package, name)) if !name.contains('/') => format!("{package}/msg/{name}"),

@@ -1,29 +1,28 @@
-//! What the `metadata.yaml` of a bag of ROS 2 says of its files. `rosbag2` writes an entry in each line, and of these four count here, so
-//! that it takes no parser of YAML.
+//! The `metadata.yaml` of a ROS 2 bag. `rosbag2` writes one entry per line, and only four matter, so no YAML parser is needed.
 
 use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-/// More than the topics of any bag take.
+/// More than any bag's metadata needs.
 const MOST_BYTES: u64 = 1 << 26;
 
-/// What is known of the files of a bag. What the file does not say is left out.
+/// The metadata of a bag. Missing entries stay empty.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Metadata {
     /// The names of its files, in order.
     pub(super) files: Vec<String>,
-    /// How many messages they hold.
+    /// The number of messages.
     pub(super) count: Option<u64>,
-    /// How each message or each file is packed, by the name of a codec; empty where nothing is.
+    /// The codec of compressed messages or files; empty if uncompressed.
     pub(super) packed: String,
 }
 
 impl Metadata {
-    /// Reads the `metadata.yaml` called `path`.
+    /// Reads the `metadata.yaml` at `path`.
     pub(super) fn read(path: &Path) -> Self {
         let mut bytes = Vec::new();
-        // Without it the files speak for themselves.
+        // It is optional.
         let _ = fs::File::open(path).and_then(|file| file.take(MOST_BYTES).read_to_end(&mut bytes));
         Self::of(&String::from_utf8_lossy(&bytes))
     }
@@ -38,7 +37,7 @@ impl Metadata {
                 continue;
             }
             let Some((key, value)) = line.split_once(':') else { continue };
-            // Topics have counts too, further in.
+            // Topics have counts too, indented further.
             let top = *at_top.get_or_insert_with(|| indent.max(1));
             in_files = key == "relative_file_paths";
             match key {
@@ -61,7 +60,7 @@ fn unquoted(text: &str) -> &str {
     text.trim().trim_matches(['"', '\''])
 }
 
-/// The name of a file; old releases write the folder before it.
+/// The name of a file; old releases include the folder.
 fn name_of(path: &str) -> String {
     unquoted(path).rsplit('/').next().unwrap_or_default().to_owned()
 }

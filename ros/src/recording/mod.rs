@@ -1,4 +1,4 @@
-//! Recordings: MCAP files and bags of ROS 2, and bags of ROS 1.
+//! Recordings: MCAP files, ROS 2 bags, and ROS 1 bags.
 
 mod bag;
 mod chunk;
@@ -29,22 +29,22 @@ use metadata::Metadata;
 use place::Place;
 pub use write::Writer;
 
-/// The names that the files of recordings end with.
+/// Extensions of recordings.
 const EXTENSIONS: [&str; 3] = ["mcap", "bag", "db3"];
-/// What the files of a recording in a folder end with.
+/// Endings of the files of a recording in a folder.
 const PARTS: [&str; 4] = [".mcap", ".mcap.zstd", ".db3", ".db3.zstd"];
-/// What a file that is packed as a whole ends with.
+/// The ending of a file that is compressed as a whole.
 const PACKED: &str = ".zstd";
-/// Beside these.
+/// The file with the metadata beside these.
 const METADATA: &str = "metadata.yaml";
 
-/// A recording: a file, or a folder with the files of one.
+/// A recording: a file, or a folder with its files.
 #[derive(Clone, Debug)]
 pub struct Recording {
     path: PathBuf,
     files: Vec<(Place, Format)>,
     topics: Vec<Topic>,
-    /// How many messages it should hold, where that is known.
+    /// The number of messages according to the metadata, if known.
     claimed: Option<u64>,
 }
 
@@ -56,11 +56,11 @@ enum Format {
 }
 
 impl Recording {
-    /// Whether `path` is called or begins like a recording, or is a folder with one.
+    /// Whether `path` is named like a recording, starts like one, or is a folder with one.
     #[must_use]
     pub fn is(path: &Path) -> bool {
         if path.is_dir() {
-            // Folders of images may have such a file, too.
+            // Folders of images may contain such a file, too.
             let entries = fs::read_dir(path).into_iter().flatten().flatten();
             let has_parts = entries.into_iter().any(|entry| is_part(&entry.path()));
             return has_parts && path.join(METADATA).is_file();
@@ -69,10 +69,10 @@ impl Recording {
         extension(path).is_some() || is_part(path) || path.is_file() && begins_as_one()
     }
 
-    /// Opens the recording `path` and finds its topics: in its summary, or by reading it once where it has none.
+    /// Opens the recording `path` and finds its topics, in its summary or by reading it once.
     ///
     /// # Errors
-    /// [`Error::Read`] where there is no recording, or of another kind.
+    /// [`Error::Read`] if it is not a recording of a supported kind.
     pub fn open(path: &Path) -> Result<Self> {
         let (paths, claimed) = if path.is_dir() { in_folder(path)? } else { (vec![path.to_owned()], None) };
         let files = paths.iter().map(|path| known(path)).collect::<Result<Vec<_>>>()?;
@@ -94,14 +94,14 @@ impl Recording {
         Ok(Self { path: path.to_owned(), files, topics, claimed })
     }
 
-    /// How many messages it should hold by its `metadata.yaml`, and how many it does, where these are fewer.
+    /// The number of messages in `metadata.yaml` and the number found, if fewer.
     #[must_use]
     pub fn missing(&self) -> Option<(u64, u64)> {
         let found = self.topics.iter().map(|topic| topic.count).sum::<Option<u64>>()?;
         self.claimed.filter(|claimed| *claimed > found).map(|claimed| (claimed, found))
     }
 
-    /// As it was opened.
+    /// The path that was opened.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -112,14 +112,14 @@ impl Recording {
         self.files.iter().map(|(file, _)| file.path.as_path())
     }
 
-    /// Its topics, by their names.
+    /// Its topics, sorted by name.
     #[must_use]
     pub fn topics(&self) -> &[Topic] {
         &self.topics
     }
 
-    /// The messages of the topics of these names, in the order of the files. No more than a chunk is in memory. After an error, which
-    /// names the file, nothing follows.
+    /// The messages of the topics `names`, in the order of the files. At most one chunk is in memory. An error, which names the file, ends
+    /// the iterator.
     pub fn messages(&self, names: &[&str]) -> impl Iterator<Item = Result<Message>> + Send + use<> {
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
         let mut failed = false;
@@ -145,13 +145,13 @@ fn open(file: &Place, format: Format, names: Vec<String>) -> Messages {
     opened.unwrap_or_else(|error| Box::new(std::iter::once(Err(error))))
 }
 
-/// The extension of a file of a recording, in lower case.
+/// The extension of a recording's file, in lower case.
 fn extension(path: &Path) -> Option<String> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     EXTENSIONS.contains(&extension.as_str()).then_some(extension)
 }
 
-/// Whether `path` is called like a file of a recording in a folder.
+/// Whether `path` is named like a file of a recording in a folder.
 fn is_part(path: &Path) -> bool {
     let name = path.to_string_lossy().to_ascii_lowercase();
     PARTS.iter().any(|end| name.ends_with(end))
@@ -172,15 +172,15 @@ fn known(path: &Path) -> Result<(Place, Format)> {
         Some(format) => return Ok((place, format)),
         None if fs::metadata(path).is_ok_and(|file| file.len() == 0) => "is empty",
         None => match extension(Path::new(unpacked(&path.to_string_lossy()))).as_deref() {
-            Some("bag") => "is no bag of ROS 1: it does not begin with #ROSBAG V2.0",
-            Some("db3") => "is no bag of ROS 2: it does not begin as a database of SQLite",
-            _ => "is no MCAP file: it does not begin as one",
+            Some("bag") => "is not a ROS 1 bag: it does not start with #ROSBAG V2.0",
+            Some("db3") => "is not a ROS 2 bag: it does not start like an SQLite database",
+            _ => "is not an MCAP file: it does not start like one",
         },
     };
     Err(Error::read(path, reason))
 }
 
-/// The files of the recording in a folder, in order, and how many messages they should hold.
+/// The files of the recording in a folder, in order, and the number of messages according to the metadata.
 fn in_folder(folder: &Path) -> Result<(Vec<PathBuf>, Option<u64>)> {
     let entries = fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
     let mut paths: Vec<PathBuf> =
@@ -188,25 +188,27 @@ fn in_folder(folder: &Path) -> Result<(Vec<PathBuf>, Option<u64>)> {
     paths.retain(|path| is_part(path) && path.is_file());
     let metadata = Metadata::read(&folder.join(METADATA));
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    // Somebody may have packed or unpacked it since.
+    // The file may have been compressed or decompressed since.
     let is_there = |file: &String| paths.iter().any(|path| unpacked(&name(path)) == unpacked(file));
     if let Some(missing) = metadata.files.iter().find(|file| !is_there(file)) {
-        let reason = "there is no such file, though metadata.yaml names it as a part of this recording; get it, or take its line out of \
-                      metadata.yaml to do without it";
+        let reason = "there is no such file, but metadata.yaml lists it; get it, or remove its line from \
+                      metadata.yaml to continue without it";
         return Err(Error::read(folder.join(missing), reason));
     }
     if !["", "zstd"].contains(&metadata.packed.as_str()) {
         let packed: String = metadata.packed.chars().filter(|c| !c.is_control()).take(20).collect();
-        let reason = format!("is packed by `{packed}`, and zstd is read; unpack it with `ros2 bag convert`");
+        let reason = format!(
+            "is compressed by `{packed}`, but only zstd is supported; convert it with `ros2 bag convert`"
+        );
         return Err(Error::read(folder, reason));
     }
     if paths.is_empty() {
-        return Err(Error::read(folder, "has a metadata.yaml and no MCAP or .db3 file"));
+        return Err(Error::read(folder, "contains a metadata.yaml but no MCAP or .db3 file"));
     }
-    // `zstd -d` leaves the packed file beside the other.
+    // `zstd -d` keeps the compressed file beside the other.
     let names: HashSet<_> = paths.iter().map(|path| name(path)).collect();
     paths.retain(|path| name(path).strip_suffix(PACKED).is_none_or(|plain| !names.contains(plain)));
-    // The number at the end says their order, and 9 comes before 10.
+    // Files are ordered by the number at the end, with 9 before 10.
     paths.sort_by_key(|path| {
         let name = unpacked(&name(path)).to_owned();
         let stem = name.rsplit_once('.').map_or(&*name, |(stem, _)| stem).to_owned();
@@ -216,7 +218,7 @@ fn in_folder(folder: &Path) -> Result<(Vec<PathBuf>, Option<u64>)> {
     Ok((paths, metadata.count))
 }
 
-/// The name of a file before it was packed.
+/// The name of a file before compression.
 fn unpacked(name: &str) -> &str {
     name.strip_suffix(PACKED).unwrap_or(name)
 }

@@ -1,4 +1,4 @@
-//! Where the bytes of a recording are: in its file, or for one that is packed as a whole in a copy of it.
+//! The location of a recording's bytes: its file, or a decompressed copy of it.
 
 use std::fs;
 use std::io::{self, BufRead, BufReader, Read, Write};
@@ -10,35 +10,35 @@ use mrfgs::{Error, Result};
 use ruzstd::decoding::StreamingDecoder;
 use tempfile::{NamedTempFile, TempPath};
 
-/// How what is packed by Zstandard begins.
+/// The first bytes of Zstandard data.
 pub(super) const ZSTD: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
-/// A file that claims to hold more than so many times its size would only fill the disk.
+/// Maximum compression ratio; a file that claims more would only fill the disk.
 const MOST_TIMES: u64 = 10_000;
 
 /// A file of a recording.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
-    /// By which the user knows it.
+    /// The path for messages.
     pub(super) path: PathBuf,
-    /// Its copy, which goes with the last one who reads it.
+    /// A decompressed copy, removed with its last user.
     unpacked: Option<Arc<TempPath>>,
 }
 
 impl Place {
-    /// A file as it is.
+    /// A file that is read directly.
     pub(super) fn plain(path: &Path) -> Self {
         Self { path: path.to_owned(), unpacked: None }
     }
 
-    /// A file, unpacked where it is packed as a whole.
+    /// A file, decompressed if it is compressed as a whole.
     ///
     /// # Errors
-    /// Where it cannot be read or unpacked.
+    /// If it cannot be read or decompressed.
     pub(super) fn of(path: &Path) -> Result<Self> {
         let mut start = Vec::new();
         let read = fs::File::open(path).and_then(|file| file.take(ZSTD.len() as u64).read_to_end(&mut start));
         let plain = Self::plain(path);
-        // Who reads it says why it cannot be read.
+        // Reading it later reports the error.
         if read.is_err() || start != ZSTD {
             return Ok(plain);
         }
@@ -46,27 +46,27 @@ impl Place {
         Ok(Self { unpacked: Some(Arc::new(unpacked)), ..plain })
     }
 
-    /// Where its bytes are read.
+    /// The path to read from.
     pub(super) fn file(&self) -> &Path {
         self.unpacked.as_ref().map_or(&self.path, |unpacked| unpacked)
     }
 }
 
-/// A copy of a packed file, unpacked.
+/// Decompresses a file to a temporary one.
 fn unpacked(path: &Path) -> std::result::Result<TempPath, Reason> {
     let opened = fs::File::open(path)?;
     let most = opened.metadata()?.len().saturating_mul(MOST_TIMES);
     let written = |e: io::Error| {
         let folder = std::env::temp_dir();
         Reason::from(format!(
-            "cannot be unpacked to {}: {e}; set TMPDIR to a folder with more room, or unpack it with `zstd -d`",
+            "cannot be decompressed to {}: {e}; set TMPDIR to a folder with more space, or decompress it with `zstd -d`",
             folder.display()
         ))
     };
     let mut to = NamedTempFile::with_prefix(".mrfgs-").map_err(written)?;
     let mut from = BufReader::new(opened);
     let (mut part, mut all) = (vec![0; 1 << 16], 0);
-    // Its parts may have been packed one by one.
+    // The file may consist of several compressed frames.
     while !from.fill_buf()?.is_empty() {
         let mut decoder = StreamingDecoder::new(&mut from).map_err(|e| damaged(&e))?;
         loop {
@@ -74,7 +74,7 @@ fn unpacked(path: &Path) -> std::result::Result<TempPath, Reason> {
             all += count as u64;
             if all > most {
                 return Err(format!(
-                    "claims more than {MOST_TIMES} times its size; unpack it with `zstd -d`"
+                    "expands to more than {MOST_TIMES} times its size; decompress it with `zstd -d`"
                 )
                 .into());
             }
@@ -87,12 +87,12 @@ fn unpacked(path: &Path) -> std::result::Result<TempPath, Reason> {
             (decoder.decoder.get_checksum_from_data(), decoder.decoder.get_calculated_checksum())
             && found != Some(told)
         {
-            return Err(damaged(&"its checksum does not agree"));
+            return Err(damaged(&"its checksum is wrong"));
         }
     }
     Ok(to.into_temp_path())
 }
 
 fn damaged(e: &dyn std::fmt::Display) -> Reason {
-    format!("is damaged, or cut off: {}; get it again", e.to_string().replace('\n', " ")).into()
+    format!("is damaged or cut off: {}; get it again", e.to_string().replace('\n', " ")).into()
 }

@@ -1,5 +1,5 @@
-//! Tables of SQLite, row by row, from files that need not be sound. (SQLite itself is C, which nothing else here takes a compiler for, and
-//! of a bag two tables are read from their start to their end.) The format is that of <https://www.sqlite.org/fileformat2.html>.
+//! Reads SQLite tables row by row, from possibly damaged files. (SQLite itself would need a C compiler, and only two tables of a bag are
+//! read, from start to end.) The format: <https://www.sqlite.org/fileformat2.html>.
 
 use std::fs;
 use std::io::Read;
@@ -11,69 +11,69 @@ use mrfgs::error::Reason;
 use super::file::{File, MAX_RECORD};
 use super::place::Place;
 
-/// How such a file begins.
+/// The first bytes of a database.
 pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
 
-/// Bytes of the file before its first page begins as others do.
+/// Length of the database header at the start of the first page.
 const HEAD: usize = 100;
-/// Most pages between the root of a table and a row: more than any table of 2^31 pages has.
+/// Maximum depth of a table's tree, more than 2^31 pages can have.
 const DEEPEST: usize = 40;
 /// Kinds of pages.
 const INTERIOR: u8 = 5;
 const LEAF: u8 = 13;
 
-/// What stands beside a file that was not closed.
+/// Endings of files beside a database that was not closed.
 const UNFINISHED: [&str; 2] = ["-wal", "-journal"];
 
-/// A file with tables.
+/// A database.
 pub(super) struct Database {
     file: File,
     page_size: usize,
-    /// What is used of each page: some leave bytes at its end to others.
+    /// Usable bytes of a page, without reserved bytes at its end.
     usable: usize,
     pages: u64,
 }
 
-/// Where a table is, and how its columns are called.
+/// The root page of a table, and its column names.
 pub(super) struct Table {
     root: u64,
     columns: Vec<String>,
 }
 
-/// The way down to the next row of a table.
+/// The position in a table.
 pub(super) struct Rows {
-    /// The page at the root, and so on down to that of the row.
+    /// The pages from the root down to the current row.
     way: Vec<Page>,
     root: Option<u64>,
-    /// How many pages may still come: each belongs to a table once.
+    /// The number of pages that may still be visited, as each belongs to a table once.
     left: u64,
 }
 
-/// A page of a table, and which of its cells comes next.
+/// A page of a table, with the index of its next cell.
 struct Page {
     bytes: Vec<u8>,
-    /// Where what all pages have begins: the first one has the head of the file before it.
+    /// The offset of the page header; on the first page it follows the database header.
     start: usize,
     cell: usize,
 }
 
-/// A row, of which the last part may be on other pages.
+/// A row, whose last part may be on overflow pages.
 pub(super) struct Row {
-    /// Its number, which is its column of the type INTEGER PRIMARY KEY.
+    /// The row id, which is its column of type INTEGER PRIMARY KEY.
     pub(super) id: i64,
     bytes: Vec<u8>,
     length: u64,
-    /// The page with the rest; 0 where there is none.
+    /// The first overflow page; 0 for none.
     more: u64,
 }
 
-/// What stands in a column.
+/// The value of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Value<'a> {
-    /// Nothing, or a number that is no integer.
+    /// NULL or a float.
     Other,
     Integer(i64),
-    /// A text, too.
+    /// A blob or a text.
     Bytes(&'a [u8]),
 }
 
@@ -81,20 +81,20 @@ impl Database {
     pub(super) fn open(place: &Place) -> Result<Self> {
         let mut file = File::open(place)?;
         if file.left() < HEAD as u64 {
-            return Err(file.error("is no database of SQLite: it is shorter than its head"));
+            return Err(file.error("is not an SQLite database: it is shorter than its header"));
         }
         let head = file.take(HEAD as u64)?;
         if !head.starts_with(MAGIC) {
-            return Err(file.error("is no database of SQLite: it does not begin as one"));
+            return Err(file.error("is not an SQLite database: it does not start like one"));
         }
         for end in UNFINISHED {
             let beside = PathBuf::from(format!("{}{end}", place.path.display()));
-            // One that was done with begins with a 0, or is empty.
+            // SQLite zeroes or truncates the header of a journal it no longer needs.
             let mut first = [0];
             let is_used = fs::File::open(&beside).and_then(|mut beside| beside.read(&mut first)).is_ok();
             if is_used && first != [0] {
                 return Err(file.error(format!(
-                    "was not closed, and {} says what came last; `sqlite3 FILE 'PRAGMA wal_checkpoint(TRUNCATE)'` takes it in",
+                    "was not closed, and {} contains its last changes; merge them with `sqlite3 FILE 'PRAGMA wal_checkpoint(TRUNCATE)'`",
                     beside.display()
                 )));
             }
@@ -102,25 +102,25 @@ impl Database {
         let page_size = match number(&head[16..18]) {
             1 => 1 << 16,
             size if size.is_power_of_two() && size >= 512 => size,
-            _ => return Err(file.error("is a damaged database: its pages have no size")),
+            _ => return Err(file.error("is a damaged database: its page size is invalid")),
         };
         let usable = page_size.saturating_sub(u64::from(head[20]));
-        // 1 is UTF-8, and 0 that of a file without a table.
+        // 1 is UTF-8, 0 a database without tables.
         if usable < 480 || number(&head[56..60]) > 1 {
-            return Err(file.error("is a damaged database, or its texts are not in UTF-8"));
+            return Err(file.error("is a damaged database, or its texts are not UTF-8"));
         }
         let pages = file.len() / page_size;
         Ok(Self { file, page_size: page_size as usize, usable: usable as usize, pages })
     }
 
-    /// An error of the file, in words that go after its name.
+    /// An error of the file, with a reason worded to follow its name.
     pub(super) fn error(&self, reason: impl Into<Reason>) -> mrfgs::Error {
         self.file.error(reason)
     }
 
-    /// The table called `name`; `None` where there is none.
+    /// The table called `name`; `None` if there is none.
     pub(super) fn table(&mut self, name: &str) -> Result<Option<Table>> {
-        // The table of all tables: its type, name, table, root, and the words that made it.
+        // The schema table: type, name, table name, root page and SQL of each table.
         let mut rows = self.rows(&Table { root: 1, columns: Vec::new() });
         while let Some(row) = rows.next(self)? {
             let row = self.whole(row)?;
@@ -136,12 +136,12 @@ impl Database {
         Ok(None)
     }
 
-    /// The rows of a table, by their numbers.
+    /// The rows of a table, ordered by row id.
     pub(super) fn rows(&self, table: &Table) -> Rows {
         Rows { way: Vec::new(), root: Some(table.root), left: self.pages }
     }
 
-    /// The row with its last part.
+    /// Completes a row from its overflow pages.
     pub(super) fn whole(&mut self, mut row: Row) -> Result<Row> {
         if row.length > MAX_RECORD.min(self.file.len()) {
             return Err(
@@ -162,12 +162,12 @@ impl Database {
 
     fn page(&mut self, which: u64) -> Result<Vec<u8>> {
         if which == 0 {
-            return Err(self.error("is a damaged database: a page of it is missing"));
+            return Err(self.error("is a damaged database: a page is missing"));
         }
         let at = (which - 1).saturating_mul(self.page_size as u64);
         if at.saturating_add(self.page_size as u64) > self.file.len() {
             return Err(self.error(format!(
-                "is cut off: page {which} is beyond its end of {} bytes; what is whole before it counts",
+                "is cut off: page {which} is beyond its end of {} bytes; complete messages are used",
                 self.file.len()
             )));
         }
@@ -175,13 +175,13 @@ impl Database {
         self.file.take(self.page_size as u64)
     }
 
-    /// The row in a cell of a leaf; `None` where the cell is damaged.
+    /// The row in a cell of a leaf page; `None` if the cell is damaged.
     fn row(&self, page: &[u8], at: usize) -> Option<Row> {
         let mut rest = page.get(at..self.usable)?;
         let length = varint(&mut rest)?;
         let id = varint(&mut rest)?.cast_signed();
         let usable = self.usable as u64;
-        // As much stays on the page as leaves room for four rows, and the rest fills other pages.
+        // SQLite keeps enough of a row on its page that four rows fit, and stores the rest on overflow pages.
         let most = usable - 35;
         let least = (usable - 12) * 32 / 255 - 23;
         let local = if length <= most {
@@ -197,7 +197,7 @@ impl Database {
 }
 
 impl Table {
-    /// Which column is called `name`.
+    /// The position of the column called `name`.
     pub(super) fn column(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column.eq_ignore_ascii_case(name))
     }
@@ -209,7 +209,7 @@ impl Rows {
         if let Some(root) = self.root.take() {
             self.descend(database, root)?;
         }
-        let damaged = "is a damaged database: a page of it makes no sense";
+        let damaged = "is a damaged database: a page is invalid";
         while let Some(page) = self.way.last_mut() {
             let cell = page.cell;
             page.cell += 1;
@@ -232,7 +232,7 @@ impl Rows {
 
     fn descend(&mut self, database: &mut Database, page: u64) -> Result<()> {
         if self.way.len() == DEEPEST || self.left == 0 {
-            return Err(database.error("is a damaged database: its pages go round in a circle"));
+            return Err(database.error("is a damaged database: its pages form a cycle"));
         }
         self.left -= 1;
         let start = if page == 1 { HEAD } else { 0 };
@@ -246,19 +246,19 @@ impl Page {
         self.bytes[self.start]
     }
 
-    /// How many cells it has.
+    /// The number of cells.
     fn count(&self) -> usize {
         number(&self.bytes[self.start + 3..self.start + 5]) as usize
     }
 
-    /// Where a cell begins.
+    /// The offset of a cell.
     fn place(&self, cell: usize) -> Option<usize> {
         let first = self.start + if self.kind() == INTERIOR { 12 } else { 8 };
         let at = self.bytes.get(first + 2 * cell..first + 2 * cell + 2)?;
         Some(number(at) as usize)
     }
 
-    /// The page below a cell of an interior page; that of the last one stands in its head.
+    /// The child page of a cell of an interior page; the last one is in the page header.
     fn child(&self, cell: usize) -> Option<u64> {
         let at = if cell == self.count() { self.start + 8 } else { self.place(cell)? };
         self.bytes.get(at..at + 4).map(number)
@@ -266,7 +266,7 @@ impl Page {
 }
 
 impl Row {
-    /// What stands in a column, as far as the row is there.
+    /// The value of a column, as far as the row is loaded.
     pub(super) fn value(&self, column: usize) -> Value<'_> {
         self.found(column).unwrap_or(Value::Other)
     }
@@ -284,7 +284,7 @@ impl Row {
         let value = values.get(..usize::try_from(length(kind)).ok()?)?;
         Some(match kind {
             1..=6 => {
-                // Of fewer than eight bytes the sign is in the first one.
+                // The sign is in the first byte.
                 let sign = if value[0] & 0x80 == 0 { 0 } else { -1_i64 };
                 Value::Integer(value.iter().fold(sign, |all, byte| all << 8 | i64::from(*byte)))
             }
@@ -296,7 +296,7 @@ impl Row {
     }
 }
 
-/// The bytes of a value of this type.
+/// The size in bytes of a value of this type.
 fn length(kind: u64) -> u64 {
     match kind {
         1..=4 => kind,
@@ -307,8 +307,7 @@ fn length(kind: u64) -> u64 {
     }
 }
 
-/// The number of up to nine bytes at the beginning of `bytes`, which is taken off: seven bits in each, highest first, and eight in the
-/// ninth.
+/// Takes a varint of up to nine bytes off `bytes`: seven bits each, most significant first, and eight bits in the ninth.
 fn varint(bytes: &mut &[u8]) -> Option<u64> {
     let mut all = 0;
     for n in 0..9 {
@@ -325,12 +324,12 @@ fn varint(bytes: &mut &[u8]) -> Option<u64> {
     None
 }
 
-/// A number whose highest byte comes first.
+/// A big-endian number.
 fn number(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0, |all, byte| all << 8 | u64::from(*byte))
 }
 
-/// The names of the columns in the words that make a table.
+/// The column names in a CREATE TABLE statement.
 fn columns(words: &str) -> Vec<String> {
     let list = words.split_once('(').map_or("", |(_, list)| list);
     let name = |column: &str| column.split_whitespace().next().unwrap_or_default().to_owned();

@@ -24,7 +24,7 @@ fn frame(number: i64) -> Image<'static> {
     }
 }
 
-/// What is read of the topic `/left/image`, and the error at the end.
+/// The messages of the topic `/left/image`, and the error at the end.
 fn read(path: &Path) -> (Vec<Vec<u8>>, Option<String>) {
     let recording = match Recording::open(path) {
         Ok(recording) => recording,
@@ -40,7 +40,7 @@ fn read(path: &Path) -> (Vec<Vec<u8>>, Option<String>) {
     (messages, said)
 }
 
-/// A file of the crate `mcap`, in chunks of about three images.
+/// A file written by the crate `mcap`, in chunks of about three images.
 fn foreign(path: &Path) -> Vec<Vec<u8>> {
     let file = fs::File::create(path).unwrap();
     let options = ::mcap::WriteOptions::new().profile("ros2").chunk_size(Some(3000));
@@ -61,7 +61,7 @@ fn foreign(path: &Path) -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn files_of_others_are_read() {
+fn files_of_the_mcap_crate_are_read() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("a.mcap");
     let all = foreign(&path);
@@ -72,9 +72,9 @@ fn files_of_others_are_read() {
     assert!(Recording::is(&path) && !Recording::is(folder.path()));
 }
 
-/// Whatever is wrong with a file, what lies before that is read, and nothing panics.
+/// With any damage, everything before it is read, and nothing panics.
 #[test]
-fn what_lies_before_damage_is_read() {
+fn everything_before_damage_is_read() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("a.mcap");
     let all = foreign(&path);
@@ -85,11 +85,11 @@ fn what_lies_before_damage_is_read() {
         let (messages, said) = read(&path);
         assert_eq!(messages, all[..messages.len()], "{length}");
         least = least.min(messages.len());
-        // Behind the last message, nothing of it is missing.
+        // Cuts after the last message lose nothing.
         assert!(said.is_some_and(|said| said.contains("a.mcap")) || messages.len() == 10, "{length}");
     }
     assert_eq!(least, 0);
-    // Each byte in turn: a message may be lost, and none is another unless no checksum counts.
+    // Changes each byte in turn: messages may be lost, but none changes, as checksums cover them.
     for at in (8..whole.len()).step_by(61) {
         let mut damaged = whole.clone();
         damaged[at] ^= 0x41;
@@ -97,14 +97,14 @@ fn what_lies_before_damage_is_read() {
         let (messages, _) = read(&path);
         assert_eq!(messages, all[..messages.len()], "{at}");
     }
-    // Texts that claim 4 GiB, of a channel, of its metadata, and of a chunk.
+    // Texts that claim 4 GiB, in a channel, its metadata, and a chunk.
     for (kind, start) in
         [(4, &[1, 0, 0, 0][..]), (4, &[&[1, 0, 0, 0][..], &[0; 8], &[4, 0, 0, 0]].concat()), (6, &[0; 28])]
     {
         let body = [start, &[0xff; 4]].concat();
         fs::write(&path, [MAGIC, &[kind], &(body.len() as u64).to_le_bytes(), &body].concat()).unwrap();
         let said = read(&path).1.unwrap();
-        assert!(said.contains("a text in it has no end"), "{said}");
+        assert!(said.contains("a text has no end"), "{said}");
     }
     // A record of 8 EiB, and a chunk that claims 1 TiB.
     for (kind, body) in [(3, &[][..]), (6, &[&[0; 16][..], &(1_u64 << 40).to_le_bytes(), &[0; 16]].concat())]
@@ -118,7 +118,7 @@ fn what_lies_before_damage_is_read() {
 }
 
 #[test]
-fn chunks_may_be_packed() {
+fn chunks_may_be_compressed() {
     let bytes = frame(3).encode();
     let mut lz4 = FrameEncoder::new(Vec::new());
     lz4.write_all(&bytes).unwrap();
@@ -134,7 +134,7 @@ fn chunks_may_be_packed() {
         let size = bytes.len() as u64;
         assert_eq!(chunk::unpacked(&packed, method, size).unwrap(), bytes, "{method}");
         for (size, words) in
-            [(size - 1, "holds more than"), (size + 1, "claims"), (1 << 40, "at most 1073741824")]
+            [(size - 1, "contains more than"), (size + 1, "claims"), (1 << 40, "at most 1073741824")]
         {
             let said = chunk::unpacked(&packed, method, size).unwrap_err().to_string();
             assert!(said.contains(words), "{method}: {said}");
@@ -142,11 +142,11 @@ fn chunks_may_be_packed() {
         let said = chunk::unpacked(&packed[..packed.len() / 2], method, size).unwrap_err().to_string();
         assert!(said.contains("is damaged"), "{method}: {said}");
     }
-    assert!(chunk::unpacked(&bytes, "rar", 1).unwrap_err().to_string().contains("packed by `rar`"));
+    assert!(chunk::unpacked(&bytes, "rar", 1).unwrap_err().to_string().contains("compressed by `rar`"));
 }
 
 #[test]
-fn what_is_written_is_read_by_others() {
+fn written_files_are_read_by_the_mcap_crate() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("a.mcap");
     let mut writer = Writer::new(fs::File::create(&path).unwrap()).unwrap();
@@ -161,7 +161,7 @@ fn what_is_written_is_read_by_others() {
     }
     writer.finish().unwrap();
     assert_eq!(read(&path), (all.clone(), None));
-    // By the crate, with its index, its summary and all checksums.
+    // Read by the crate, with index, summary and all checksums.
     let bytes = fs::read(&path).unwrap();
     let stream = ::mcap::Summary::read(&bytes).unwrap().unwrap();
     let statistics = stream.stats.unwrap();
@@ -194,7 +194,7 @@ fn what_is_written_is_read_by_others() {
         }
     }
     assert_eq!((chunks, indexed), (3, 10_010));
-    // Control: one byte of a chunk.
+    // Control: one byte of a chunk is changed.
     let mut damaged = bytes;
     damaged[2000] ^= 1;
     fs::write(&path, damaged).unwrap();
@@ -252,12 +252,12 @@ fn bags_are_read() {
     assert_eq!(read(&path), (vec![b"one".to_vec(), b"two".to_vec()], None));
     let topics = Recording::open(&path).unwrap().topics().to_vec();
     assert_eq!((topics.len(), topics[1].kind.as_str()), (2, "sensor_msgs/msg/Image"));
-    // One that was not closed: all is there, and that it is not whole is told.
+    // A bag that was not closed: all messages are read, and the end is reported as missing.
     fs::write(&path, [bag(0), chunks].concat()).unwrap();
     let (messages, said) = read(&path);
     assert_eq!(messages.len(), 2);
     assert!(said.unwrap().contains("not closed"));
-    // Cut off, and with each byte changed: nothing panics.
+    // Cut anywhere or with any byte changed, nothing panics.
     for length in 0..whole.len() {
         fs::write(&path, &whole[..length]).unwrap();
         let _ = read(&path);
@@ -268,7 +268,7 @@ fn bags_are_read() {
     }
 }
 
-/// A bag of ROS 2 that SQLite has made, of ten images between many texts.
+/// A ROS 2 bag written by SQLite, with ten images among many texts.
 fn of_sqlite(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus/recording").join(name)
 }
@@ -276,7 +276,7 @@ fn of_sqlite(name: &str) -> PathBuf {
 #[test]
 fn bags_in_sqlite_are_read() {
     let all: Vec<_> = (0..10).map(|number| frame(number).encode()).collect();
-    // Pages of 4096 bytes by rosbags, and of 512 with interior ones and a long entry of a topic.
+    // Pages of 4096 bytes by rosbags, and of 512 bytes with interior pages and a long topic entry.
     for (name, others) in [("rosbags.db3", 10), ("small.db3", 120)] {
         let path = of_sqlite(name);
         assert_eq!(read(&path), (all.clone(), None), "{name}");
@@ -287,7 +287,7 @@ fn bags_in_sqlite_are_read() {
     }
 }
 
-/// Whatever is wrong with it, nothing panics or goes on for ever, and what lies before a cut is as it was.
+/// With any damage nothing panics or loops forever, and everything before a cut is unchanged.
 #[test]
 fn damaged_databases_are_refused() {
     let folder = TempDir::new().unwrap();
@@ -307,25 +307,25 @@ fn damaged_databases_are_refused() {
         fs::write(&path, damaged).unwrap();
         refused += usize::from(read(&path).1.is_some());
     }
-    // A byte of a message or of what nothing reads is not noticed: SQLite has no checksums.
+    // Changes in messages or unused bytes are not noticed, as SQLite has no checksums.
     assert!((200..whole.len() / 2).contains(&refused), "{refused}");
-    // What came last stands beside it.
+    // Files with the last changes beside it.
     fs::write(&path, &whole).unwrap();
     fs::write(folder.path().join("a.db3-journal"), [0; 512]).unwrap();
-    assert_eq!(read(&path).1, None, "a journal that was done with");
+    assert_eq!(read(&path).1, None, "a finished journal");
     fs::write(folder.path().join("a.db3-wal"), "x").unwrap();
     let said = read(&path).1.unwrap();
     assert!(said.contains("was not closed") && said.contains("a.db3-wal"), "{said}");
 }
 
 #[test]
-fn messages_may_be_packed_alone() {
+fn messages_may_be_compressed_individually() {
     let bytes = frame(3).encode();
     let zstd = ruzstd::encoding::compress_to_vec(&bytes[..], ruzstd::encoding::CompressionLevel::Fastest);
     assert_eq!(chunk::unpacked_alone(&zstd).unwrap(), bytes);
     for broken in [&zstd[..zstd.len() / 2], b"\x28\xb5\x2f\xfd"] {
         let said = chunk::unpacked_alone(broken).unwrap_err().to_string();
-        assert!(said.contains("is damaged") || said.contains("is no zstd"), "{said}");
+        assert!(said.contains("is damaged") || said.contains("is not zstd"), "{said}");
     }
 }
 
@@ -334,7 +334,7 @@ fn folders_have_their_files_in_order() {
     let folder = TempDir::new().unwrap();
     let at = |name: &str| folder.path().join(name);
     fs::write(at("metadata.yaml"), "").unwrap();
-    assert!(!Recording::is(folder.path()), "it may have images");
+    assert!(!Recording::is(folder.path()), "it may contain images");
     let said = |words: &str| {
         let said = Recording::open(folder.path()).unwrap_err().to_string();
         assert!(said.contains(words), "{said}");
@@ -356,9 +356,9 @@ fn folders_have_their_files_in_order() {
     said("drive_12.mcap.zstd: is empty");
 }
 
-/// What `rosbag2` says of its files is so, or is told.
+/// The claims of `rosbag2` about its files are checked.
 #[test]
-fn what_metadata_says_is_kept() {
+fn metadata_is_checked() {
     let folder = TempDir::new().unwrap();
     let at = |name: &str| folder.path().join(name);
     for number in [0_i64, 1] {
@@ -380,10 +380,10 @@ fn what_metadata_says_is_kept() {
     assert_eq!(Recording::open(folder.path()).unwrap().missing(), Some((5, 2)));
     metadata(&format!("{both}  - a_2.mcap\n"), 3, "''");
     let said = read(folder.path()).1.unwrap();
-    assert!(said.contains("a_2.mcap: there is no such file, though metadata.yaml names it"), "{said}");
+    assert!(said.contains("a_2.mcap: there is no such file, but metadata.yaml lists it"), "{said}");
     metadata(both, 2, "fake_comp");
-    assert!(read(folder.path()).1.unwrap().contains("packed by `fake_comp`"));
-    // A part that was packed since, and one beside what it was unpacked to.
+    assert!(read(folder.path()).1.unwrap().contains("compressed by `fake_comp`"));
+    // A file that was compressed since, and one beside its decompressed copy.
     metadata(both, 2, "zstd");
     let packed = zstd(&fs::read(at("a_1.mcap")).unwrap());
     fs::write(at("a_1.mcap.zstd"), &packed).unwrap();
@@ -397,12 +397,12 @@ fn zstd(bytes: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn files_may_be_packed_as_a_whole() {
+fn files_may_be_compressed_as_a_whole() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("a.db3.zstd");
     let whole = fs::read(of_sqlite("small.db3")).unwrap();
     let all: Vec<_> = (0..10).map(|number| frame(number).encode()).collect();
-    // In one part, or in two, each packed by itself.
+    // As one frame, or as two frames.
     let halves = [zstd(&whole[..1000]), zstd(&whole[1000..])].concat();
     for packed in [zstd(&whole), halves] {
         fs::write(&path, &packed).unwrap();
@@ -410,12 +410,12 @@ fn files_may_be_packed_as_a_whole() {
         assert_eq!(read(&path), (all.clone(), None));
         fs::write(&path, &packed[..packed.len() / 2]).unwrap();
         let said = read(&path).1.unwrap();
-        assert!(said.contains("a.db3.zstd: is damaged, or cut off"), "{said}");
+        assert!(said.contains("a.db3.zstd: is damaged or cut off"), "{said}");
     }
     fs::write(&path, zstd(b"a text")).unwrap();
     let said = read(&path).1.unwrap();
-    assert!(said.contains("a.db3.zstd: is no bag of ROS 2"), "{said}");
-    // What is unpacked goes with the recording.
+    assert!(said.contains("a.db3.zstd: is not a ROS 2 bag"), "{said}");
+    // The decompressed copy is removed with the recording.
     fs::write(&path, zstd(&whole)).unwrap();
     let recording = Recording::open(&path).unwrap();
     let copy = recording.files[0].0.file().to_owned();
@@ -426,9 +426,9 @@ fn files_may_be_packed_as_a_whole() {
     assert!(!copy.exists());
 }
 
-/// A message of an MCAP file that is packed by itself, as `rosbag2` does it.
+/// A message of an MCAP file that is individually compressed, as by `rosbag2`.
 #[test]
-fn messages_of_mcap_files_may_be_packed_alone() {
+fn messages_of_mcap_files_may_be_compressed_individually() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("a.mcap");
     let file = std::io::BufWriter::new(fs::File::create(&path).unwrap());
@@ -442,15 +442,15 @@ fn messages_of_mcap_files_may_be_packed_alone() {
 }
 
 #[test]
-fn what_is_no_recording_is_told() {
+fn files_that_are_not_recordings_are_refused() {
     let folder = TempDir::new().unwrap();
     for (name, content, words) in [
         ("a.mcap", &b""[..], "a.mcap: is empty"),
-        ("a.mcap", b"a text", "is no MCAP file"),
-        ("a.bag", b"a text", "is no bag of ROS 1"),
-        ("a.bag", b"#ROSBAG V1.2\n", "is no bag of ROS 1"),
-        ("a.db3", b"a text", "is no bag of ROS 2"),
-        ("a.db3", b"SQLite format 3\0", "is no database of SQLite: it is shorter"),
+        ("a.mcap", b"a text", "is not an MCAP file"),
+        ("a.bag", b"a text", "is not a ROS 1 bag"),
+        ("a.bag", b"#ROSBAG V1.2\n", "is not a ROS 1 bag"),
+        ("a.db3", b"a text", "is not a ROS 2 bag"),
+        ("a.db3", b"SQLite format 3\0", "is not an SQLite database: it is shorter"),
         ("a.bag", b"#ROSBAG V2.0\n\xff\xff\xff\xff", "is cut off"),
     ] {
         let path = folder.path().join(name);

@@ -1,4 +1,4 @@
-//! MCAP files in the making. (The crate `mcap` packs chunks by libraries in C alone.)
+//! Writes MCAP files. (The crate `mcap` needs C libraries to compress chunks.)
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -9,23 +9,22 @@ use mcap::records::op;
 
 use crate::messages::{Encode, Stamp, definition};
 
-/// A chunk has at least so many bytes before it is packed, unless it is the last one.
+/// Minimum bytes of a chunk before compression, except for the last one.
 const CHUNK: usize = 1 << 22;
 
-/// Writes an MCAP file of ROS 2, with chunks in LZ4, their indexes and a summary. It is whole once it is
-/// [finished](Self::finish).
+/// Writes a ROS 2 MCAP file with LZ4 chunks, their indexes and a summary. [`finish`](Self::finish) completes it.
 pub struct Writer<W> {
     to: W,
-    /// How many bytes it has, and their checksum.
+    /// Bytes written so far, and their checksum.
     at: u64,
     checksum: crc32fast::Hasher,
-    /// The records of the types and of the topics so far, and the latter's names.
+    /// The records of types and topics so far, with their names.
     schemas: Vec<(&'static str, Vec<u8>)>,
     channels: Vec<Channel>,
     chunk: Vec<u8>,
-    /// Where the messages of each channel are in the chunk: time and place.
+    /// Time and offset of each channel's messages in the chunk.
     places: BTreeMap<u16, Vec<(u64, u64)>>,
-    /// The records that tell of the chunks.
+    /// The index records of the chunks.
     chunks: Vec<Vec<u8>>,
     /// The first and the last time of all messages.
     times: Option<[u64; 2]>,
@@ -42,7 +41,7 @@ impl<W: Write> Writer<W> {
     /// Begins the file.
     ///
     /// # Errors
-    /// Those of `to`.
+    /// Errors of `to`.
     pub fn new(to: W) -> io::Result<Self> {
         let mut writer = Self {
             to,
@@ -64,10 +63,10 @@ impl<W: Write> Writer<W> {
         Ok(writer)
     }
 
-    /// Adds a message on `topic`, seen at `stamp`. All messages of a topic have one type.
+    /// Adds a message on `topic`, seen at `stamp`. All messages of a topic must have the same type.
     ///
     /// # Errors
-    /// Those of writing.
+    /// Errors of writing.
     pub fn add<M: Encode>(&mut self, topic: &str, stamp: Stamp, message: &M) -> io::Result<()> {
         let channel = self.channel::<M>(topic);
         let time = u64::try_from(stamp.0).unwrap_or(0);
@@ -90,7 +89,7 @@ impl<W: Write> Writer<W> {
         if self.chunk.len() >= CHUNK { self.end_chunk() } else { Ok(()) }
     }
 
-    /// The number of a topic, which a chunk describes before its first message.
+    /// The number of a topic; its definition is written before its first message.
     fn channel<M: Encode>(&mut self, topic: &str) -> u16 {
         if let Some(at) = self.channels.iter().position(|channel| channel.topic == topic) {
             return at as u16 + 1;
@@ -162,10 +161,10 @@ impl<W: Write> Writer<W> {
         Ok(())
     }
 
-    /// Ends the file.
+    /// Completes the file.
     ///
     /// # Errors
-    /// Those of writing.
+    /// Errors of writing.
     pub fn finish(mut self) -> io::Result<W> {
         self.end_chunk()?;
         let checksum = self.checksum.clone().finalize();
@@ -195,7 +194,7 @@ impl<W: Write> Writer<W> {
             self.record(op::SUMMARY_OFFSET, &offset)?;
         }
         let places = [start, offsets_start].map(u64::to_le_bytes).concat();
-        // The checksum counts the footer up to itself.
+        // The checksum includes the footer up to itself.
         self.put(&[&[op::FOOTER][..], &20_u64.to_le_bytes(), &places].concat())?;
         let checksum = self.checksum.clone().finalize();
         self.put(&checksum.to_le_bytes())?;
@@ -230,7 +229,7 @@ fn push(to: &mut Vec<u8>, kind: u8, body: &[u8]) {
     to.extend(body);
 }
 
-/// Adds bytes behind their number.
+/// Adds bytes, preceded by their number.
 fn list(to: &mut Vec<u8>, bytes: &[u8]) {
     to.extend((bytes.len() as u32).to_le_bytes());
     to.extend(bytes);

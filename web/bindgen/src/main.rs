@@ -1,6 +1,6 @@
-//! Writes the JavaScript, the types and the module of the page's engine: `mrfgs-web-bindgen MODULE FOLDER`.
+//! Generates the JavaScript, types and module of the page's engine: `mrfgs-web-bindgen MODULE FOLDER`.
 //!
-//! The program `wasm-bindgen` would do the same, but brings a web server for its tests, and must be installed apart in the very
+//! The program `wasm-bindgen` would do the same, but it includes a web server for tests, and must be installed separately in exactly the
 //! version of the crate.
 
 use std::path::PathBuf;

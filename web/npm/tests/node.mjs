@@ -1,4 +1,4 @@
-// Tries the package in Node.js, in the fresh project in which it lies. Needs MRFGS, the program, and MRFGS_ROOT, its repository.
+// Tests the package in Node.js, in the fresh project that contains it. Needs MRFGS, the program, and MRFGS_ROOT, the repository.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -16,7 +16,7 @@ const files = ['im0.png', 'im1.png'].map((name) => join(root, 'testdata/mixed', 
 const [left, right] = files.map((file) => PNG.sync.read(readFileSync(file)));
 const range = { minDisparity: 0, maxDisparity: 47 };
 
-/** The disparities that the program finds, and its validity map, from the top row on. */
+/** The disparity and validity maps of the program, top row first. */
 function program(left, right, ...flags) {
     const map = join(folder, 'map.pfm');
     const also = ['--also', 'validity', '--device', 'cpu', '--quiet'];
@@ -40,16 +40,16 @@ for (const method of ['default', 'fast']) {
         const heard = [];
         const found = await matcher.match(left, right, { ...range, onProgress: (done) => heard.push(done) });
         assert.deepEqual([found.width, found.height, found.confidence.length], [320, 240, 320 * 240]);
-        assert.ok(heard.length > 2 && heard.every((done) => done >= 0 && done <= 1), 'nothing is heard of the progress');
+        assert.ok(heard.length > 2 && heard.every((done) => done >= 0 && done <= 1), 'no progress is reported');
         assert.equal(matcher.reasons.length, 9);
         same(found, program(...files, '--method', method));
-        // The control of this check: other views give other maps.
+        // Control: other views must give other maps.
         const other = await matcher.match(right, left, range);
         assert.throws(() => same(other, program(...files, '--method', method)));
     });
 }
 
-test('views of 16 bits of grey give the map of the program', async () => {
+test('16-bit grey views give the map of the program', async () => {
     const grey = [left, right].map(({ data, width, height }) => {
         const samples = Uint16Array.from({ length: width * height }, (_, i) => 200 * data[4 * i] + data[4 * i + 1]);
         return { data: samples, width, height };
@@ -64,14 +64,14 @@ test('views of 16 bits of grey give the map of the program', async () => {
     same(await matcher.match(...grey, range), program(...names, '--method', 'fast'));
 });
 
-test('without a range it is found, and matches wait for one another', async () => {
+test('the range is found if not given, and concurrent matches run in turn', async () => {
     const matcher = await createMatcher({ method: 'fast', device: 'cpu' });
     const [first, second] = await Promise.all([matcher.match(left, right), matcher.match(left, right, range)]);
     assert.ok(first.maxDisparity > first.minDisparity);
     assert.deepEqual([second.minDisparity, second.maxDisparity], [0, 47]);
 });
 
-test('an abort ends a match, and the next one runs', async () => {
+test('an abort ends a match, and the next one succeeds', async () => {
     const matcher = await createMatcher({ method: 'fast' });
     const stopped = new AbortController();
     const match = matcher.match(left, right, { ...range, signal: stopped.signal, onProgress: () => stopped.abort() });
@@ -80,13 +80,13 @@ test('an abort ends a match, and the next one runs', async () => {
     assert.equal((await matcher.match(left, right, range)).width, 320);
 });
 
-test('bad input is told in one line', async () => {
+test('bad input is reported in one line', async () => {
     const matcher = await createMatcher();
     const cases = [
         [[left, { ...right, width: 160, height: 480 }, range], /^.*320 x 240.*160 x 480.*$/],
-        [[left, { data: right.data, width: 7, height: 7 }, range], /^right: .* samples are not 1 to 4 for each of 7 x 7 pixels$/],
+        [[left, { data: right.data, width: 7, height: 7 }, range], /^right: .* samples do not fit 7 x 7 pixels with 1 to 4 samples each$/],
         [[undefined, right, range], /^left: give ImageData.*$/],
-        [[left, { data: new Uint16Array(4 * 320 * 240), width: 320, height: 240 }, range], /^one view has 8 bits.*$/],
+        [[left, { data: new Uint16Array(4 * 320 * 240), width: 320, height: 240 }, range], /^one image has 8 bits.*$/],
         [[left, right, { minDisparity: 5, maxDisparity: 4 }], /^.*maxDisparity.*$/],
         [[left, right, { minDisparity: 0, maxDisparity: 100_000 }], /^.*maxDisparity.*$/],
         [[left, right, { maxDisparity: 4.5 }], /^maxDisparity is 4.5.*$/],
@@ -97,7 +97,7 @@ test('bad input is told in one line', async () => {
     }
     matcher.close();
     await assert.rejects(matcher.match(left, right, range), { message: /closed/ });
-    await assert.rejects(createMatcher({ method: 'quick' }), { message: /^method is "quick": take default, / });
+    await assert.rejects(createMatcher({ method: 'quick' }), { message: /^method is "quick": use default, / });
     await assert.rejects(createMatcher({ device: 'gpu' }), { message: /^device is "gpu": take auto, cpu, webgpu$/ });
     await assert.rejects(createMatcher({ device: 'webgpu' }), { message: /Node.js/ });
 });

@@ -1,4 +1,4 @@
-// Tries the package for npm as its users take it: installed in fresh projects, in Node.js and, built by Vite and without it, in Chromium.
+// Tests the npm package as users install it: in fresh projects, in Node.js and in Chromium, with and without Vite.
 //
 //   node web/npm/tests/try.mjs TARBALL   MRFGS names the program to compare with
 import assert from 'node:assert/strict';
@@ -14,7 +14,7 @@ import { ROOT, scene } from '../../tests/lib/paths.mjs';
 import { serve } from '../../tests/lib/server.mjs';
 
 const VITE = '8.3.8';
-// Standard output has the one line for the table of scripts/release.
+// Standard output is reserved for the line in the table of scripts/release.
 const TOLD = ['ignore', 2, 2];
 const tarball = resolve(process.argv[2]);
 const folder = mkdtempSync(join(tmpdir(), 'mrfgs-npm-'));
@@ -34,7 +34,7 @@ function inNode() {
     execFileSync(process.execPath, ['--test', '--test-reporter=spec', 'node.test.mjs'], { cwd: at, stdio: TOLD, env });
 }
 
-/** In Chromium: built by Vite, by its development server, and without a bundler. Whether there is a Chromium. */
+/** Tests in Chromium: built by Vite, from its development server, and without a bundler. Returns whether there is a Chromium. */
 async function byVite() {
     const at = project('vite', `vite@${VITE}`);
     cpSync(join(ROOT, 'web/npm/tests/vite'), at, { recursive: true });
@@ -47,7 +47,7 @@ async function byVite() {
     const { createServer } = await import(pathToFileURL(join(at, 'node_modules/vite/dist/node/index.js')).href);
     const development = await createServer({ root: at, logLevel: 'warn', optimizeDeps: { exclude: ['@mrfgs/wasm'] }, server: { host: '127.0.0.1' } });
     await development.listen();
-    // The page without types, and the package by its address.
+    // Removes the types from the page, and refers to the package by its URL.
     const script = readFileSync(join(at, 'main.ts'), 'utf8');
     const bare = join(at, 'bare');
     mkdirSync(bare);
@@ -89,7 +89,7 @@ async function byVite() {
     return true;
 }
 
-/** PFM has the last row first. */
+/** Reverses the rows, as PFM stores the last row first. */
 function upsideDown(map, width) {
     const rows = Array.from({ length: map.length / (4 * width) }, (_, y) => map.subarray(4 * width * y, 4 * width * (y + 1)));
     return Buffer.concat(rows.reverse());
@@ -101,7 +101,7 @@ try {
     const { version } = JSON.parse(readFileSync(join(folder, 'vite/node_modules/vite/package.json')));
     console.log(`the program's map in Node.js ${process.versions.node}; built by Vite ${version}${chromium ? ', and the same map in Chromium' : ''}`);
     if (!chromium) {
-        console.error('LEFT OUT: the package in Chromium, which is not installed');
+        console.error('SKIPPED: the package in Chromium, as it is not installed');
     }
 } finally {
     rmSync(folder, { recursive: true, force: true });

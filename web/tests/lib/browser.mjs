@@ -7,23 +7,23 @@ const PLACES = {
     firefox: ['FIREFOX', '/usr/bin/firefox-esr', '/usr/bin/firefox'],
 };
 
-/** The path of a browser, by the variable CHROMIUM or FIREFOX, or where systems have it; undefined where there is none. */
+/** The path of a browser: from the variable CHROMIUM or FIREFOX, or the usual places; undefined if there is none. */
 export function installed(name) {
     const [variable, ...paths] = PLACES[name];
     return [process.env[variable], ...paths].find((path) => path && existsSync(path));
 }
 
-// Points that swing would be another picture each time.
+// Swinging points would make pictures differ.
 const CALM = ['--force-prefers-reduced-motion'];
 const QUIET = ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync'];
 const WEBGPU = ['--enable-unsafe-webgpu', '--use-webgpu-adapter=swiftshader'];
-// WebGL for the points, by software too.
+// WebGL for the points, also in software.
 const WEBGL = ['--enable-unsafe-swiftshader'];
 
-/** A browser that saves downloads in a folder; with `gpu: false` one without WebGPU. */
+/** Launches a browser that saves downloads in a folder; with `gpu: false` without WebGPU. */
 export async function launch(name, { gpu = true, downloads } = {}) {
     const executablePath = installed(name);
-    // Matches on software drivers take their time.
+    // Matches on software drivers are slow.
     const common = { executablePath, headless: true, protocolTimeout: 600_000 };
     if (name === 'firefox') {
         return puppeteer.launch({

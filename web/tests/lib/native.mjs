@@ -1,14 +1,14 @@
-// What the program writes for a pair: what every browser must give too.
+// The output of the program for a pair, which every browser must reproduce.
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { ROOT } from './paths.mjs';
 
-/** The program; the variable MRFGS names another build of it. */
+/** The program; the variable MRFGS names another build. */
 const PROGRAM = process.env.MRFGS ?? join(ROOT, 'target/release/mrfgs');
 
-/** Runs `mrfgs match` on the CPU; answers with the bytes of the map and of all that `also` names. */
+/** Runs `mrfgs match` on the CPU, and returns the bytes of the map and of the outputs in `also`. */
 export function native(left, right, flags = [], also = ['raw', 'confidence', 'validity']) {
     const folder = mkdtempSync(join(tmpdir(), 'mrfgs-'));
     try {
@@ -24,7 +24,7 @@ export function native(left, right, flags = [], also = ['raw', 'confidence', 'va
     }
 }
 
-/** The first byte in which two files differ; undefined where they are the same. */
+/** The offset of the first byte that differs; undefined if the files are equal. */
 export function difference(a, b) {
     if (Buffer.compare(a, b) === 0) {
         return undefined;

@@ -1,4 +1,4 @@
-// Where things are.
+// Paths of the project.
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 

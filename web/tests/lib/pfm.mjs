@@ -1,6 +1,6 @@
-// The program's maps, as numbers.
+// Reads the maps of the program.
 
-/** Disparities of a PFM file, from the top row down. */
+/** Disparities of a PFM file, top row first. */
 export function disparities(file) {
     const [, width, height] = file.toString('latin1', 0, 40).match(/^Pf\n(\d+) (\d+)\n-1(?:\.0)?\n/).map(Number);
     const start = file.length - 4 * width * height;

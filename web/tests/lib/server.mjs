@@ -1,4 +1,4 @@
-// A static host of the built page, in a sub-folder as GitHub Pages has it. It can be stopped while a page is open.
+// A static host of the built page, in a sub-folder as on GitHub Pages. It can be stopped while a page is open.
 import { createReadStream, readFileSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { basename, extname, join, normalize } from 'node:path';
@@ -16,8 +16,8 @@ const TYPES = {
 };
 
 /**
- * Serves folders below these prefixes: `{ '/mrfgs/': 'target/web/site' }`. A function takes requests itself.
- * `replace` changes the text of all files with a name.
+ * Serves folders below these prefixes: `{ '/mrfgs/': 'target/web/site' }`; a function instead of a folder handles requests.
+ * `replace` edits the text of all files with this name.
  * @returns {Promise<{ url: string, asked: string[], replace(name: string, edit: (text: string) => string): void, stop(): Promise<void> }>}
  */
 export async function serve(mounts, port = 0) {

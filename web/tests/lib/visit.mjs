@@ -1,4 +1,4 @@
-// A visitor of the built page: a browser, a host, and what one does there with mouse and keyboard.
+// A visitor of the built page: a browser, a host, and actions with mouse and keyboard.
 import assert from 'node:assert/strict';
 import { existsSync, mkdtempSync, readFileSync, readdirSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -7,13 +7,13 @@ import { launch } from './browser.mjs';
 import { SITE } from './paths.mjs';
 import { serve } from './server.mjs';
 
-/** Longer than any match on a software driver takes. */
+/** Longer than any match on a software driver. */
 const PATIENCE = 120_000;
 
 export const BROWSER = process.env.MRFGS_BROWSER ?? 'chromium';
 
 export class Visit {
-    /** Opens the page and waits until the engine is there. */
+    /** Opens the page and waits for the engine. */
     static async open(options = {}) {
         const visit = new Visit();
         visit.downloads = mkdtempSync(join(tmpdir(), 'mrfgs-downloads-'));
@@ -26,7 +26,7 @@ export class Visit {
     async page({ width = 1280, height = 800, before } = {}) {
         this.tab = await this.browser.newPage();
         await this.tab.setViewport({ width, height });
-        /** What must not happen: errors, refusals by the Content-Security-Policy, requests that leave the host. */
+        /** Unexpected events: errors, violations of the Content-Security-Policy, requests to other hosts. */
         this.faults = [];
         this.tab.on('pageerror', (error) => this.faults.push(error.message));
         this.tab.on('console', (message) => {
@@ -59,14 +59,14 @@ export class Visit {
         assert.deepEqual(this.faults, []);
     }
 
-    /** Starts a match, and waits until it is in the middle. */
+    /** Starts a match, and waits until it is in progress. */
     async begin() {
         await this.tab.click('#match');
         await this.state('matching');
         await this.tab.waitForFunction(() => document.getElementById('progress').value > 0.02);
     }
 
-    /** Waits until the page is at one of these. */
+    /** Waits for one of these states. */
     async state(...states) {
         const now = () => this.tab.$eval('#app', (app) => app.dataset.state);
         try {
@@ -78,7 +78,7 @@ export class Visit {
         return now();
     }
 
-    /** Waits until nothing runs. */
+    /** Waits until nothing is running. */
     settled() {
         return this.state('empty', 'ready', 'done', 'failed');
     }
@@ -87,7 +87,7 @@ export class Visit {
         return this.tab.$eval(selector, (element) => element.textContent);
     }
 
-    /** Waits for a text that matches; answers with it. */
+    /** Waits for a text that matches, and returns it. */
     async says(selector, pattern) {
         const [source, flags] = [pattern.source, pattern.flags];
         const found = (selector, source, flags) => {
@@ -107,8 +107,8 @@ export class Visit {
     }
 
     /**
-     * Drops or pastes files, `{ name, path }`, anywhere or on a slot. What is pasted without files is text. `{ folder, files }` is dropped as a
-     * folder; of its files, one without a path cannot be read.
+     * Drops or pastes files, `{ name, path }`, anywhere or on a slot; pasting no files pastes text. `{ folder, files }` is dropped as a folder,
+     * in which files without a path cannot be read.
      */
     give(way, files, slot) {
         const packed = ({ name, path, folder, files }) => (files ? { folder, files: files.map(packed) } : { name, content: path && readFileSync(path, 'base64') });
@@ -128,7 +128,7 @@ export class Visit {
                 if (files.length === 0) {
                     transfer.setData('text/plain', 'words');
                 }
-                // Firefox lets no script make an event with files in it.
+                // Firefox does not let scripts create events with files.
                 events = [Object.defineProperty(new Event('paste', properties), 'clipboardData', { value: transfer })];
             } else if (files.some(({ folder }) => folder)) {
                 const items = files.map((file) => ({ webkitGetAsEntry: () => entry(file) }));
@@ -143,7 +143,7 @@ export class Visit {
         }, files.map(packed), way, slot);
     }
 
-    /** Lets no file be read in the page until `release`; with `first` the file that comes next alone. */
+    /** Delays all file reads in the page until `release`; with `first` only the next one. */
     holdFiles(first = false) {
         return this.tab.evaluate((first) => {
             const real = Blob.prototype.arrayBuffer;
@@ -159,7 +159,7 @@ export class Visit {
         }, first);
     }
 
-    /** Lets no call of this name reach the worker until `release`. */
+    /** Delays the calls of this name to the worker until `release`. */
     holdCalls(name) {
         return this.tab.evaluate((name) => {
             const real = Worker.prototype.postMessage;
@@ -189,7 +189,7 @@ export class Visit {
         return this.tab.evaluate(() => window.release());
     }
 
-    /** Counts from now on how many workers are started. */
+    /** Starts counting the workers that are created. */
     async countWorkers() {
         await this.tab.evaluate(() => {
             const Real = Worker;
@@ -209,7 +209,7 @@ export class Visit {
         return Promise.all(['#left .name', '#right .name'].map((selector) => this.text(selector)));
     }
 
-    /** Does what changes the pair, and waits until the page has taken it up; answers with the state. */
+    /** Changes the pair, waits until the page has processed it, and returns the state. */
     async changed(action) {
         const before = await this.tab.$eval('#app', (app) => Number(app.dataset.turn ?? 0));
         await action();
@@ -218,7 +218,7 @@ export class Visit {
         return this.settled();
     }
 
-    /** Chooses the views of a folder, and what else is named. */
+    /** Chooses the views of a folder, and further files. */
     async pair(folder, ...also) {
         const state = await this.changed(() => this.choose('left', join(folder, 'im0.png'), join(folder, 'im1.png'), ...also));
         assert.equal(state, 'ready', await this.text('#pair-problem'));
@@ -227,7 +227,7 @@ export class Visit {
     /** Opens a rendered scene, which is matched. */
     async scene(name) {
         await this.changed(() => this.tab.click(`[data-scene=${name}]`));
-        // The pair is read, and then matched.
+        // The pair is read first, then matched.
         return this.state('done', 'empty', 'failed');
     }
 
@@ -261,7 +261,7 @@ export class Visit {
         assert.equal(await this.state('done', 'ready'), 'done', await this.text('#problem'));
     }
 
-    /** Clicks a download and waits for its file; answers with its name and bytes. */
+    /** Clicks a download, waits for the file, and returns its name and bytes. */
     async save(output) {
         for (const file of readdirSync(this.downloads)) {
             rmSync(join(this.downloads, file));
@@ -269,7 +269,7 @@ export class Visit {
         await this.tab.click(`#downloads [data-output=${output}]`);
         for (;;) {
             const [name] = readdirSync(this.downloads).filter((file) => !/\.(part|crdownload|tmp)$|^\./.test(file));
-            // Firefox makes an empty file first, and fills another.
+            // Firefox first creates an empty file, then fills another.
             const partial = readdirSync(this.downloads).length > 1;
             if (name && !partial && existsSync(join(this.downloads, name))) {
                 const bytes = readFileSync(join(this.downloads, name));

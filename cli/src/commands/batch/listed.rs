@@ -1,4 +1,4 @@
-//! The pairs of a batch: rows of a list, or the folders in a folder. A list with a mistake is refused as a whole.
+//! The pairs of a batch: rows of a list, or folders in a folder. A list with a mistake is refused as a whole.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,9 +15,9 @@ use crate::pairs::folder::{self, CALIBRATION, Folder};
 use crate::pairs::input;
 use crate::pairs::list::{self, Names, Row};
 
-/// Many pairs.
+/// A list of pairs.
 pub(super) struct List {
-    /// What the paths of the pairs count from.
+    /// The folder that relative paths start at.
     pub(super) base: PathBuf,
     pub(super) pairs: Vec<Listed>,
 }
@@ -28,33 +28,33 @@ pub(super) struct Listed {
     source: Source,
 }
 
-/// The source of a pair; paths are as the list has them.
+/// The source of a pair; paths are as written in the list.
 enum Source {
     Row(Row),
-    /// The folder in [`List::base`] that has the pair's name.
+    /// The folder in [`List::base`] named after the pair.
     Folder,
 }
 
-/// What all pairs have in common that the list does not say.
-pub(super) struct Given<'a> {
-    /// The calibration of pairs for which the list has none.
+/// Settings from flags, which apply to all pairs.
+pub(super) struct BatchSettings<'a> {
+    /// The calibration of pairs without one in the list.
     pub(super) calib: &'a [PathBuf],
-    /// The part of the calibrated images that the images show.
+    /// The crop of the calibrated images that the images show.
     pub(super) crop: &'a CropArgs,
-    /// How the images are rectified, where they are as the cameras took them.
+    /// How to rectify the images, if they are raw.
     pub(super) rectify: Option<Options>,
-    /// The output that takes the cameras.
+    /// An output that needs the cameras, if there is one.
     pub(super) cameras: Option<&'a Also>,
-    /// The file of the camera that an output is in the view of.
+    /// The file of `--into`.
     pub(super) into: Option<&'a Path>,
 }
 
-/// A pair, read.
-pub(super) struct Read {
+/// A pair with its inputs.
+pub(super) struct LoadedPair {
     pub(super) input: input::Input,
-    /// The cameras, where an output takes them.
+    /// The cameras, if an output needs them.
     pub(super) rig: Option<Rig>,
-    /// Without the output, which the reader does not know.
+    /// The paths, without the output.
     pub(super) files: Files,
 }
 
@@ -62,12 +62,12 @@ impl List {
     /// Reads the list `path`, or the names of the folders in the folder `path`.
     ///
     /// # Errors
-    /// [`Error::Read`] with the line, where there is one, for what cannot be read, makes no sense or is empty.
+    /// [`Error::Read`], with the line number if there is one, for a list that is unreadable, malformed or empty.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let list = if path.is_dir() { Self::of_folders(path)? } else { Self::of_rows(path)? };
         if list.pairs.is_empty() {
             let reason =
-                "lists no pair; give a CSV file with a row for each, or a folder with a folder for each";
+                "contains no pairs; give a CSV file with a row per pair, or a folder with a folder per pair";
             return Err(Error::read(path, reason).into());
         }
         Ok(list)
@@ -79,7 +79,7 @@ impl List {
         Ok(Self { base: path.parent().unwrap_or(Path::new("")).to_owned(), pairs: pairs.collect() })
     }
 
-    /// A pair for each folder that is not hidden, in the order of their names.
+    /// A pair for each visible folder, in the order of their names.
     fn of_folders(path: &Path) -> Result<Self> {
         let mut found = Vec::new();
         for entry in fs::read_dir(path).map_err(|e| Error::read(path, e))? {
@@ -101,8 +101,8 @@ impl List {
 }
 
 impl Listed {
-    /// Every file that is there and may be read of it, as the list has it, or the flags.
-    pub(super) fn inputs(&self, base: &Path, given: &Given) -> Vec<String> {
+    /// Every existing input file of the pair: paths from the list as written, paths from flags absolute.
+    pub(super) fn inputs(&self, base: &Path, given: &BatchSettings) -> Vec<String> {
         let inputs = match &self.source {
             Source::Row(Row { left, right, mask, calibration, max_disparity, .. }) => {
                 let takes_calibration = given.cameras.is_some() || max_disparity.is_none();
@@ -124,17 +124,17 @@ impl Listed {
         let own = inputs.into_iter().filter(|path| base.join(path).exists());
         let shared =
             given.calib.iter().filter(|_| !self.has_calibration()).map(PathBuf::as_path).chain(given.into);
-        // Those of the flags do not start at the list.
+        // Paths from flags are not relative to the list.
         let shared = shared.filter_map(|path| path.canonicalize().ok()).map(|path| shown(&path));
         own.chain(shared).collect()
     }
 
-    /// Whether the list says its calibration.
+    /// Whether the list gives a calibration for the pair.
     fn has_calibration(&self) -> bool {
         matches!(&self.source, Source::Row(row) if !row.calibration.is_empty())
     }
 
-    /// What the list says of its range.
+    /// The range in the list.
     pub(super) fn search(&self) -> Search {
         match &self.source {
             &Source::Row(Row { max_disparity, min_disparity, .. }) => {
@@ -144,8 +144,8 @@ impl Listed {
         }
     }
 
-    /// Reads its images and what else its range takes, and the cameras where an output takes them.
-    pub(super) fn read(&self, base: &Path, reader: Reader, given: &Given) -> Result<Read> {
+    /// Reads the images, resolves the range, and reads the cameras if an output needs them.
+    pub(super) fn read(&self, base: &Path, reader: Reader, given: &BatchSettings) -> Result<LoadedPair> {
         let at = |path: &String| base.join(path);
         let mut calib = given.calib.to_vec();
         let (pair, range, [left, right], mask) = match &self.source {
@@ -158,7 +158,7 @@ impl Listed {
                 let pair = views(reader, &at(left), other.as_deref(), mask_file.as_deref())?;
                 (pair, None, [left, right.as_ref().unwrap_or(left)].map(Clone::clone), mask.clone())
             }
-            // Its calibration and its truth are of rectified images.
+            // The calib.txt and the ground truth belong to rectified images, so they are not used.
             Source::Folder if given.rectify.is_some() => {
                 let dir = at(&self.name);
                 let pair = Folder::to_match(&dir)?.views(reader)?;
@@ -172,8 +172,7 @@ impl Listed {
         };
         let search = range.map_or_else(|| self.search(), Search::from);
         if given.rectify.is_some() && calib.is_empty() {
-            let reason =
-                "takes a calibration; give one in the column calibration, or one for all with --calib";
+            let reason = "needs a calibration; give one per pair in the column calibration, or one for all with --calib";
             return Err(Failure::usage("--rectify", reason));
         }
         let left_image = at(&left);
@@ -195,10 +194,10 @@ impl Listed {
             Source::Folder => Some(calibration_beside(&left)).filter(|path| at(path).exists()),
         };
         let files = Files { left, right, mask, calibration, output: None };
-        Ok(Read { input, rig, files })
+        Ok(LoadedPair { input, rig, files })
     }
 
-    /// The paths of the views in the folder `dir`, as a list would have them.
+    /// The paths of the views in the folder `dir`, relative to the list.
     fn views_of(&self, dir: &Path) -> Result<[String; 2]> {
         let names = Folder::to_match(dir)?.view_names();
         Ok(names.map(|file| shown(&Path::new(&self.name).join(file))))

@@ -28,16 +28,16 @@ use crate::progress::Counter;
 use crate::{console, remedy, stop};
 
 pub(crate) use args::Args;
-use listed::{Given, List, Listed, Read, shown};
+use listed::{BatchSettings, List, Listed, LoadedPair, shown};
 use request::{Request, State};
 
-/// How long to wait for pairs that other runs match.
+/// How long to wait while other runs match the remaining pairs.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// What all pairs have in common.
+/// The settings of a run.
 struct Batch<'a> {
     args: &'a Args,
-    given: Given<'a>,
+    given: BatchSettings<'a>,
     third: Option<ThirdCamera>,
     method: Method,
     reader: Reader,
@@ -60,18 +60,19 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     batch.run(&pairs, matcher)
 }
 
-/// Refuses an output folder that could not be one, and outputs that would overwrite an input.
-fn check_folder(args: &Args, base: &Path, pairs: &[Listed], given: &Given) -> Result<()> {
+/// Refuses an invalid output folder, and outputs that would overwrite an input.
+fn check_folder(args: &Args, base: &Path, pairs: &[Listed], given: &BatchSettings) -> Result<()> {
     let folder = &args.folder;
     let place = files::folder_place(folder)?;
     if args.list.is_dir() {
         if args.list.canonicalize().is_ok_and(|list| place.starts_with(list)) {
-            let reason = format!("lies in {}, the folder of the pairs; give another", args.list.display());
+            let reason =
+                format!("is inside {}, the folder of the pairs; give another folder", args.list.display());
             return Err(Error::write(folder, Reason::of_request(reason)).into());
         }
         return Ok(());
     }
-    // What lies elsewhere cannot be overwritten.
+    // Only inputs in the output folder can be overwritten.
     let inputs = pairs.iter().flat_map(|listed| listed.inputs(base, given)).map(|path| base.join(path));
     let inputs = inputs.chain([args.list.clone()]).chain(args.method.files().map(Path::to_owned));
     let inside = inputs.filter_map(|path| {
@@ -86,7 +87,7 @@ fn check_folder(args: &Args, base: &Path, pairs: &[Listed], given: &Given) -> Re
     let owned = pairs.iter().flat_map(|listed| owned(&listed.name));
     match owned.into_iter().find(|name| inside.contains(&name.to_lowercase())) {
         Some(name) => {
-            let reason = "is an input, and an output would take its place; give another folder";
+            let reason = "is an input that an output would overwrite; give another folder";
             Err(Error::write(folder.join(name), Reason::of_request(reason)).into())
         }
         None => Ok(()),
@@ -103,12 +104,12 @@ fn owned(name: &str) -> Vec<String> {
 }
 
 impl<'a> Batch<'a> {
-    /// With its pairs.
+    /// The batch and its pairs.
     fn new(args: &'a Args) -> Result<(Self, Vec<Listed>)> {
         args.maps.also.check(args.rectify)?;
         let method = args.maps.also.made_by(args.method.method()?)?;
         let List { base, pairs } = List::read(&args.list)?;
-        let given = Given {
+        let given = BatchSettings {
             calib: &args.calib,
             crop: &args.crop,
             rectify: args.rectification.options_if(args.rectify)?,
@@ -133,7 +134,7 @@ impl<'a> Batch<'a> {
         self.request(listed).state(&self.record(listed), &self.method)
     }
 
-    /// Prints a line for each pair, and how many there are of each state.
+    /// Prints a line for each pair, and the number of pairs in each state.
     fn print_status(&self, pairs: &[Listed]) -> Result<()> {
         let mut text = String::new();
         let [mut complete, mut failed, mut missing] = [0; 3];
@@ -151,16 +152,16 @@ impl<'a> Batch<'a> {
         match failed {
             0 => Ok(()),
             _ => Err(Failure::Failed(format!(
-                "{failed} of {} failed; run without --status to try again",
+                "{failed} of {} failed; run without --status to retry",
                 pairs.len()
             ))),
         }
     }
 
-    /// Matches every pair that is not complete.
+    /// Matches every incomplete pair.
     fn run(&self, pairs: &[Listed], mut matcher: Matcher) -> Result<()> {
         for listed in pairs {
-            // Where that fails, so does the claim that the pair takes.
+            // If this fails, claiming the pair fails too and reports it.
             let _ = Claim::remove_remains(&self.args.folder, &listed.name);
         }
         let mut left: VecDeque<_> =
@@ -169,7 +170,7 @@ impl<'a> Batch<'a> {
         let (mut done, mut skipped, mut failed) = (0, all - left.len(), Vec::new());
         let mut bar = Counter::of_pairs(all, skipped, self.args.quiet);
         let (mut told, mut doubtful) = (None, 0);
-        // How many pairs in a row other runs had claimed.
+        // Number of consecutive pairs claimed by other runs.
         let mut taken = 0;
         while let Some(listed) = left.pop_front() {
             let name = listed.name.as_str();
@@ -192,7 +193,7 @@ impl<'a> Batch<'a> {
                     continue;
                 }
                 Ok(Some(_)) if self.state(listed) == State::Complete => {
-                    // Another run has matched it since this one began.
+                    // Another run has matched it in the meantime.
                     skipped += 1;
                     bar.end_pair();
                     continue;
@@ -209,7 +210,7 @@ impl<'a> Batch<'a> {
                         let say = |warning| console::say(&format!("{name}: warning: {warning}"));
                         bar.past(|| warnings.iter().for_each(say));
                     }
-                    // Why there is no device is the same for all that follow.
+                    // The reason for the device is the same for every pair, so print it once.
                     if note.is_some() && note != told && !self.args.quiet {
                         bar.past(|| note.iter().for_each(|note| console::say(note)));
                         told = note;
@@ -227,7 +228,7 @@ impl<'a> Batch<'a> {
         drop(bar);
         let summary = format!("{done} done, {skipped} skipped, {} failed", failed.len());
         if !failed.is_empty() {
-            let text = format!("{summary}: {}; run it again to try these once more", failed.join(", "));
+            let text = format!("{summary}: {}; run it again to retry these", failed.join(", "));
             return Err(Failure::Failed(text));
         }
         if !self.args.quiet {
@@ -237,7 +238,7 @@ impl<'a> Batch<'a> {
         Ok(())
     }
 
-    /// Whether the pairs that follow would fail for the same reason.
+    /// Whether all later pairs would fail for the same reason.
     fn concerns_all(&self, failure: &Failure) -> bool {
         use ErrorKind::{FileTooLarge, QuotaExceeded, ReadOnlyFilesystem, StorageFull};
         match failure {
@@ -252,7 +253,7 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Matches one pair and writes its outputs, or why it failed. Returns the note of the match, and the warnings.
+    /// Matches one pair and writes its outputs, or a record of the failure. Returns the note about the device and the warnings.
     fn pair(
         &self,
         listed: &Listed,
@@ -267,7 +268,7 @@ impl<'a> Batch<'a> {
             let text = request.failed(&record, &self.method, failure);
             match text.and_then(|text| self.publish(claim, &[], &record, &text)) {
                 Err(failure) if self.concerns_all(&failure) => return Err(failure),
-                // A record that cannot be written is why the pair failed, or comes after that: it is told anyway.
+                // The pair has failed already, and that failure is reported.
                 _ => {}
             }
         }
@@ -283,7 +284,7 @@ impl<'a> Batch<'a> {
         let (request, record) = (self.request(listed), self.record(listed));
         write::check_path(&record)?;
         let (read, matched, time, warnings) = self.compute(listed, matcher)?;
-        let Read { input, rig, mut files } = read;
+        let LoadedPair { input, rig, mut files } = read;
         let (range, rectifying) = (matched.range(), input.rectifying());
         let pair = input.pair;
         let wanted = &self.args.maps;
@@ -305,7 +306,7 @@ impl<'a> Batch<'a> {
         &self,
         listed: &Listed,
         matcher: &mut Matcher,
-    ) -> Result<(Read, Matched, Duration, Vec<String>)> {
+    ) -> Result<(LoadedPair, Matched, Duration, Vec<String>)> {
         let (wanted, folder) = (&self.args.maps, &self.args.folder);
         let read = listed.read(&self.base, self.reader, &self.given)?;
         let (input, pair) = (&read.input, &read.input.pair);
@@ -320,7 +321,7 @@ impl<'a> Batch<'a> {
         Ok((read, matched, time, warnings))
     }
 
-    /// The user knows a file by its place in the output folder.
+    /// Makes errors name the final path instead of the temporary one.
     fn named<E: Into<Failure>>(&self, claim: &Claim, result: Result<(), E>) -> Result<()> {
         result.map_err(|e| match e.into() {
             Failure::Error(Error::Write { path, reason }) => {
@@ -331,8 +332,8 @@ impl<'a> Batch<'a> {
         })
     }
 
-    /// Puts `outputs` in their place, and then the record. Without a record the pair is not complete, so the old record is removed
-    /// first, and with it the outputs that it names.
+    /// Moves `outputs` and then the record to their places. Until then the pair must not count as complete, so the old record and its
+    /// outputs are removed first.
     fn publish(&self, claim: &Claim, outputs: &[String], record: &Path, text: &str) -> Result<()> {
         let name = record.file_name().unwrap_or(record.as_os_str());
         let staged_record = claim.folder().join(name);
@@ -366,7 +367,7 @@ mod tests {
         args: Args,
     }
 
-    /// For every flag: command lines without and with it, or with another value of it; and whether that changes a byte of an output.
+    /// For every flag: arguments without and with it (or with another value), and whether that changes an output.
     const FLAGS: [(&str, &str, &str, bool); 21] = [
         ("calib", "--calib one.yml --also depth", "--calib two.yml --also depth", true),
         ("calib-crop", "--calib one.yml", "--calib one.yml --calib-crop 0,0,320,200", true),
@@ -391,7 +392,7 @@ mod tests {
         ("threads", "", "--threads 1", false),
     ];
 
-    /// A folder with one pair, and files of a camera.
+    /// A folder with a pair and calibration files.
     fn workshop() -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
@@ -406,7 +407,7 @@ mod tests {
         folder
     }
 
-    /// The request in the record of the first pair in `list`; names of files are those in `folder`.
+    /// The request for the first pair in `list`; file names in `flags` are relative to `folder`.
     fn asked(folder: &Path, list: &str, flags: &str) -> Value {
         let words = ["batch", list, "out"].into_iter().chain(flags.split_whitespace());
         let words = words.map(|word| {
@@ -423,7 +424,7 @@ mod tests {
         let folder = workshop();
         let program = Program::command();
         let known: Vec<_> = program.get_arguments().filter_map(clap::Arg::get_long).collect();
-        assert_eq!(known.len(), FLAGS.len(), "each flag is in the table: {known:?}");
+        assert_eq!(known.len(), FLAGS.len(), "every flag must be in the table: {known:?}");
         for name in known {
             let row = FLAGS
                 .iter()
@@ -482,7 +483,7 @@ mod tests {
             fs::write(&path, bytes).unwrap();
             assert_ne!(before, ask(), "{name}");
         }
-        // A calibration beside the left image, where none is given.
+        // A calib.txt beside the left image counts too.
         let ask = || asked(folder.path(), "list.csv", "--also depth");
         let before = ask();
         fs::remove_file(folder.path().join("calib.txt")).unwrap();

@@ -1,4 +1,4 @@
-//! The record of a pair of a batch, the last of its files: what was asked for, and what was found.
+//! The record of a pair of a batch, written after its outputs: the request and the result.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,39 +16,38 @@ use crate::outputs::{MatchRecord, files};
 use crate::remedy;
 
 use super::args::Args;
-use super::listed::{Given, Listed};
+use super::listed::{BatchSettings, Listed};
 
-/// What a batch is asked to make of a pair. The record of a complete pair holds the same request.
+/// The work requested for a pair. The record of a complete pair contains the same request.
 #[derive(Serialize)]
 pub(super) struct Request<'a> {
     inputs: Vec<InputFile>,
     #[serde(flatten)]
     search: Search,
-    /// Every flag, but for those that change no output and those that something else here says; they are left out where they are
-    /// declared.
+    /// All flags except those that affect no output or are recorded elsewhere; these have `serde(skip)`.
     #[serde(flatten)]
     flags: &'a Args,
-    /// The names of the maps, in the output folder.
+    /// The names of the maps in the output folder.
     outputs: Vec<String>,
 }
 
-/// A file as it was when it was read.
+/// An input file at the time it was read.
 #[derive(Serialize)]
 struct InputFile {
     path: String,
     bytes: Option<u64>,
-    /// When it was last changed, in ms since 1970.
+    /// Time of the last modification, in ms since 1970.
     modified: Option<u64>,
 }
 
-/// How far a pair is.
+/// The state of a pair.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum State {
-    /// Its record says that it is done, for the same request.
+    /// The record says done, for the same request.
     Complete,
-    /// Its record says why it failed.
+    /// The record says failed; with the reason.
     Failed(String),
-    /// There is no record, or one of another request.
+    /// There is no record, or one of a different request.
     Missing,
 }
 
@@ -77,7 +76,7 @@ impl<'a> Request<'a> {
         flags: &'a Args,
         listed: &Listed,
         base: &Path,
-        given: &Given,
+        given: &BatchSettings,
         outputs: Vec<String>,
     ) -> Self {
         let inputs = listed.inputs(base, given).into_iter().map(|path| {
@@ -97,17 +96,17 @@ impl<'a> Request<'a> {
         &self.outputs
     }
 
-    /// The outputs that the record `path` names; none where there is no record.
+    /// The outputs named in the record `path`; none if there is no record.
     pub(super) fn recorded_outputs(path: &Path) -> Vec<String> {
         let record = read(path).unwrap_or_default();
         serde_json::from_value(record["request"]["outputs"].clone()).unwrap_or_default()
     }
 
-    /// The state of the pair whose record is `path`, beside its outputs, if `method` is to match it.
+    /// The state of the pair with the record `path`, whose outputs are in the same folder, for a match by `method`.
     pub(super) fn state(&self, path: &Path, method: &Method) -> State {
         let Some(record) = read(path) else { return State::Missing };
         if record["status"] == "failed" {
-            return State::Failed(record["reason"].as_str().unwrap_or("for no known reason").to_owned());
+            return State::Failed(record["reason"].as_str().unwrap_or("for an unknown reason").to_owned());
         }
         let complete = record["status"] == "done"
             && record["version"] == env!("CARGO_PKG_VERSION")
@@ -120,7 +119,7 @@ impl<'a> Request<'a> {
         if complete { State::Complete } else { State::Missing }
     }
 
-    /// The text of the record `path` of a pair that is done, and whose outputs are in the folder `staged`.
+    /// The text of the record `path` of a finished pair whose outputs are in the folder `staged`.
     pub(super) fn done(
         &self,
         path: &Path,
@@ -134,7 +133,7 @@ impl<'a> Request<'a> {
         files::json_text(path, &Done { status: "done", request: self, bytes, warnings, found })
     }
 
-    /// The text of the record `path` of a pair that failed.
+    /// The text of the record `path` of a failed pair.
     pub(super) fn failed(&self, path: &Path, method: &Method, failure: &Failure) -> Result<String> {
         let reason = &failure.message(&remedy::COLUMNS);
         let version = env!("CARGO_PKG_VERSION");
@@ -146,7 +145,7 @@ fn read(path: &Path) -> Option<Value> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }
 
-/// Whether `recorded` is what `value` becomes when it is written and read: that rounds both alike.
+/// Whether `recorded` equals `value` after writing and reading it, which rounds both alike.
 fn same(recorded: &Value, value: &impl Serialize) -> bool {
     let text = serde_json::to_string(value);
     text.ok()

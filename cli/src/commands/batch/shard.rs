@@ -1,6 +1,6 @@
-//! Parts of a list for machines or jobs of their own.
+//! Parts of a list, for several machines or jobs.
 
-/// One of `count` parts; `index` is below it.
+/// Part `index` of `count`, from 0.
 #[derive(Clone, Copy)]
 pub(super) struct Shard {
     index: u64,
@@ -8,12 +8,12 @@ pub(super) struct Shard {
 }
 
 /// # Errors
-/// What to give instead, for anything but K/N.
+/// A message with the accepted form, for anything but K/N.
 pub(super) fn shard(text: &str) -> Result<Shard, String> {
     let numbers = text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse::<u32>().ok()?)));
     match numbers {
         Some((k, n)) if (1..=n).contains(&k) => Ok(Shard { index: u64::from(k - 1), count: u64::from(n) }),
-        _ => Err("give K/N with K from 1 to N, like 2/8".into()),
+        _ => Err("give K/N with K from 1 to N, such as 2/8".into()),
     }
 }
 
@@ -44,7 +44,7 @@ mod tests {
             let even = 1000 / count;
             assert!(sizes.iter().all(|size| (even / 3..=even * 3).contains(size)), "{sizes:?}");
         }
-        // The published values of FNV-1a for "a" and "foobar", folded, so that no release moves a pair.
+        // The published FNV-1a values of "a" and "foobar", folded: the part of a pair must never change between releases.
         for (name, hash) in [("a", 0xaf63_dc4c_8601_ec8c_u64), ("foobar", 0x8594_4171_f739_67e8)] {
             let (index, count) = ((hash >> 32 ^ hash & 0xffff_ffff) % 1009, 1009);
             assert!(Shard { index, count }.holds(name), "{name}");

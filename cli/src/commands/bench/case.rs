@@ -26,18 +26,18 @@ use crate::process::{peak_memory, processor_time};
 use super::args::Args;
 use super::findings::{Figures, Findings, Row};
 
-/// What is measured in one process.
+/// A measurement, done in one process.
 pub(super) struct Case<'a> {
     pub(super) args: &'a Args,
-    /// The folder of the pair; none where it is made up.
+    /// The folder of the pair; `None` for the generated pair.
     pub(super) dir: Option<&'a Path>,
-    /// The preset that is measured, or that the files of `--method` change.
+    /// The preset to measure, or the one that files of `--method` override.
     pub(super) base: &'static str,
     pub(super) device: &'a DeviceChoice,
 }
 
 impl Case<'_> {
-    /// Measures in a process of its own, whose memory no case before has touched.
+    /// Measures in a separate process, so that earlier cases do not affect its memory.
     pub(super) fn apart(&self) -> Result<Row> {
         let failed = Failure::Failed;
         let program = std::env::current_exe().map_err(|e| Failure::from(Error::read("this program", e)))?;
@@ -58,7 +58,7 @@ impl Case<'_> {
         row.ok_or_else(|| failed(format!("{}: nothing was measured", self.pair_name())))
     }
 
-    /// The command line that measures this case alone.
+    /// The command line that measures only this case.
     fn arguments(&self) -> Vec<OsString> {
         let args = self.args;
         let mut all: Vec<OsString> = vec!["bench".into(), "--json=-".into()];
@@ -100,7 +100,7 @@ impl Case<'_> {
         }
     }
 
-    /// Measures here.
+    /// Measures in this process.
     pub(super) fn measure(&self) -> Result<Row> {
         let (pair, range) = if let Some(dir) = self.dir {
             Folder::to_match(dir)?.read_pair(self.args.reading.reader())?
@@ -113,7 +113,7 @@ impl Case<'_> {
         let what = format!("{name}, method {method}, {device}");
         let figures = match self.figures(&pair, range) {
             Err(failure @ Failure::Error(Error::Memory(_))) => {
-                console::say(&format!("{what}: left out: {failure}"));
+                console::say(&format!("{what}: skipped: {failure}"));
                 None
             }
             figures => Some(figures?),
@@ -155,7 +155,7 @@ impl Case<'_> {
         let stages = timed[0].iter().enumerate().map(|(i, timing)| {
             (stage_and_level(timing), median(timed.iter().map(|timings| ms(timings[i].time))))
         });
-        // Of all tiles together; every tile has run as often as any other.
+        // Sum over all tiles; every tile has run equally often.
         let counted = |of: &dyn Fn(Stage) -> u64| -> u64 {
             let counts = messages(&plan, &timed[0])
                 .map(|(stage, timing)| u64::from(timing.runs) * of(stage) / tiles.count() as u64);
@@ -202,7 +202,7 @@ impl Case<'_> {
     }
 }
 
-/// A device in the words of --device.
+/// A device as written after --device.
 fn word(device: &DeviceChoice) -> &str {
     match device {
         DeviceChoice::Auto => "auto",
@@ -212,7 +212,7 @@ fn word(device: &DeviceChoice) -> &str {
     }
 }
 
-/// The index or name of a certain device.
+/// The index or name of a named device.
 pub(super) fn name(device: &DeviceChoice) -> Option<&str> {
     matches!(device, DeviceChoice::Named(_)).then(|| word(device))
 }

@@ -1,4 +1,4 @@
-//! What a bench finds, in JSON and as text.
+//! The results of a bench, as JSON and as text.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::table::Table;
 use crate::text::{bytes, figure, plural};
 
-/// Everything that was measured. The help explains the fields.
+/// All results. The help explains the fields.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Findings {
     pub(super) version: String,
@@ -59,7 +59,7 @@ pub(super) struct Figures {
     pub(super) bytes_down: Option<u64>,
 }
 
-/// A line of the table: its name, and its cell for the figures of a device.
+/// A line of the table: its name, and the text for the figures of a device.
 type Line = (&'static str, fn(&Figures) -> String);
 
 const LINES: [Line; 21] = [
@@ -102,7 +102,7 @@ fn giga(count: u64) -> f64 {
 }
 
 impl Findings {
-    /// The figures for a terminal, the devices side by side.
+    /// The table for a terminal, with the devices side by side.
     pub(super) fn text(&self) -> String {
         let (repeats, ending) = (self.repeats, plural(self.repeats.into()));
         let mut out =
@@ -113,7 +113,7 @@ impl Findings {
             let _ =
                 writeln!(out, "\n{name}, method {method}: {width} x {height} pixels, {labels} label{ending}");
             for (device, figures) in devices {
-                let ran_on = figures.as_ref().map_or("left out: too little memory", |f| &f.ran_on);
+                let ran_on = figures.as_ref().map_or("skipped: too little memory", |f| &f.ran_on);
                 let _ = writeln!(out, "{device}: {ran_on}");
             }
             if devices.values().any(Option::is_some) {
@@ -139,7 +139,7 @@ impl Row {
         let all: BTreeSet<&str> = all.collect();
         let time = |figures: &Option<Figures>, wanted: &str| {
             let of_stage = figures.as_ref()?.stages.iter().filter(|(name, _)| stage(name) == wanted);
-            // A backend takes the time of a sweep or of its parts.
+            // Backends time a sweep as a whole or in parts.
             of_stage.map(|(_, ms)| *ms).reduce(|sum, ms| sum + ms)
         };
         let times = |stage| self.devices.values().map(|figures| time(figures, stage)).collect::<Vec<_>>();
@@ -155,7 +155,7 @@ impl Row {
     }
 }
 
-/// The stage of "dependency, level 0" and the like.
+/// The stage of a name such as "dependency, level 0".
 fn stage(name: &str) -> &str {
     name.split(',').next().unwrap_or(name)
 }

@@ -25,7 +25,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     args.threads.limit();
     let inputs = folder::inputs_of(&args.dirs).chain(args.method.files().map(Path::to_owned));
     files::check_json(args.json.as_deref(), inputs)?;
-    // What is missing in the last folder is said before the first is matched.
+    // Report missing files before any match.
     args.dirs.iter().try_for_each(|dir| Folder::to_match(dir).map(drop))?;
     let bases: &[&'static str] =
         if args.method.name().is_some() { &["default"] } else { &["default", "paper"] };
@@ -39,7 +39,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     let alone = dirs.len() * bases.len() * devices.len() == 1;
     if !alone {
-        // A device that is missing is said before the others are measured.
+        // Report missing devices before any measurement.
         for device in devices.iter().filter(|device| **device != DeviceChoice::Cpu) {
             Gpu::new(name(device))?;
         }

@@ -1,12 +1,12 @@
-//! Pairs made up on the spot for `mrfgs bench` and `cargo bench`: any size, no files, the same on every machine.
+//! Generated pairs for `mrfgs bench` and `cargo bench`: of any size, without files, the same on every machine.
 //!
-//! A ground that rises towards the bottom, with boards before it, all under grain of two sizes; each view has noise of
-//! its own. It is no test of accuracy: it keeps every stage as busy as a photograph does.
+//! A slanted ground plane with boards in front, textured with grain of two sizes and with separate noise per view. It keeps every stage as
+//! busy as a photo does, but it is no test of accuracy.
 
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::options::DisparityRange;
 
-/// A pair to be made.
+/// A pair to generate.
 #[derive(Clone, Copy)]
 pub(crate) struct Synthetic {
     pub(crate) name: &'static str,
@@ -14,17 +14,16 @@ pub(crate) struct Synthetic {
     pub(crate) width: usize,
     /// In pixels.
     pub(crate) height: usize,
-    /// Disparities are searched from 0 to one less.
+    /// Disparities 0 to `labels` - 1 are searched.
     pub(crate) labels: u32,
 }
 
-/// The quarter size of the Middlebury pairs.
+/// The quarter size of Middlebury pairs.
 pub(crate) const SMALL: Synthetic = Synthetic { name: "small", width: 450, height: 375, labels: 60 };
-/// The full size of those of 2014, about.
+/// About the full size of the Middlebury pairs of 2014.
 pub(crate) const LARGE: Synthetic = Synthetic { name: "large", width: 2964, height: 2000, labels: 280 };
 
-/// Left, right, top and bottom edge of each board in 64ths of the image, and its disparity in 64ths of the range: the
-/// nearest first.
+/// Left, right, top and bottom edge of each board in 64ths of the image, and its disparity in 64ths of the range, nearest board first.
 const BOARDS: [[usize; 5]; 4] =
     [[34, 46, 10, 58, 56], [8, 22, 22, 60, 48], [50, 60, 4, 40, 42], [20, 40, 6, 24, 36]];
 
@@ -33,7 +32,7 @@ impl Synthetic {
     pub(crate) fn pair(&self) -> mrfgs::Result<Pair> {
         let &Self { width, height, labels, .. } = self;
         let most = labels as usize - 1;
-        // What is seen at (x, y) by an eye that sees disparity d moved to the left by d * eye.
+        // The colour at (x, y) in the view `eye` (0 left, 1 right), which sees disparity d shifted left by d * eye.
         let seen = |x: usize, y: usize, eye: usize| {
             let board = BOARDS.iter().enumerate().find(|(_, [left, right, top, bottom, d])| {
                 let at = x + eye * (d * most / 64);
@@ -63,7 +62,7 @@ impl Synthetic {
     }
 }
 
-/// 32 bits that look random.
+/// A 32-bit hash.
 fn hash(x: usize, y: usize, salt: usize) -> u32 {
     let mut bits = (x as u32).wrapping_mul(0x9e37_79b1)
         ^ (y as u32).wrapping_mul(0x85eb_ca77)

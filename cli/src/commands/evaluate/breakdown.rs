@@ -1,4 +1,4 @@
-//! The tables of `--breakdown`: where the errors are, and how good confidence and validity are.
+//! The tables of `--breakdown`: where errors occur, and how good confidence and validity are.
 
 use mrfgs::evaluation::breakdown::Class;
 
@@ -34,7 +34,7 @@ pub(super) fn text(findings: &Findings) -> String {
     });
 
     format!(
-        "\nWhere the errors of the final map are (% of all pixels with known truth)\n\n{errors}\n\
+        "\nWhere the errors of the final map are (% of all pixels with ground truth)\n\n{errors}\n\
          How good confidence and validity are (%)\n\n{worth}"
     )
 }

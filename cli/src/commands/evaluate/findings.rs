@@ -1,4 +1,4 @@
-//! What an evaluation finds, as JSON has it.
+//! The results of an evaluation, as in JSON.
 
 use mrfgs::evaluation::{Breakdown, Detection, Report, Sparsification, mean};
 use mrfgs::options::Method;
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::table::Table;
 
-/// The figures of all pairs, and what they are of.
+/// The figures of all pairs, with method and device.
 #[derive(Serialize)]
 pub(super) struct Findings {
     pub(super) method: Option<Method>,
@@ -25,7 +25,7 @@ pub(super) struct Scored {
     pub(super) seconds: Option<f64>,
 }
 
-/// Figures of a pair, or the means over all; a finished map has that of the final map alone.
+/// Figures of a pair, or means over all pairs. A finished map only has `finished`.
 #[derive(Default, Serialize)]
 pub(super) struct Figures {
     pub(super) raw: Option<Report>,
@@ -37,7 +37,7 @@ pub(super) struct Figures {
 }
 
 impl Figures {
-    /// The errors of each map that there is, with its name.
+    /// The errors of each available map, with its name.
     pub(super) fn maps(&self) -> impl Iterator<Item = (&'static str, &Report)> {
         let maps = [("raw", &self.raw), ("final", &self.finished)].into_iter();
         maps.filter_map(|(map, report)| Some((map, report.as_ref()?)))
@@ -56,7 +56,7 @@ impl Findings {
         Self { method, ran_on, pairs, mean }
     }
 
-    /// Adds the rows of all pairs to a table, and from two pairs on that of their mean, below a rule each.
+    /// Adds the rows of all pairs to a table, and for two or more pairs of their mean, each after a rule.
     pub(super) fn add_rows(&self, table: &mut Table, add: impl Fn(&mut Table, &str, &Figures)) {
         table.rule();
         for pair in &self.pairs {
@@ -69,7 +69,7 @@ impl Findings {
     }
 }
 
-/// The mean over all pairs; none if one of them lacks the figure.
+/// The mean over all pairs; `None` if one of them lacks the figure.
 fn over<T>(pairs: &[Scored], of: fn(&Figures) -> Option<&T>, mean: fn(&[&T]) -> Option<T>) -> Option<T> {
     mean(&pairs.iter().map(|pair| of(&pair.figures)).collect::<Option<Vec<_>>>()?)
 }

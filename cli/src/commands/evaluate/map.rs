@@ -19,20 +19,19 @@ const EXAMPLES: &str = "\
 Examples:
   mrfgs evaluate map mine.pfm --truth disp0GT.pfm --mask mask0nocc.png";
 
-/// Print the errors of a finished map, from any matcher
+/// Print the errors of a finished map from any matcher
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Map to evaluate: .pfm, float .tif or .npy, or 16-bit .png with disparity times 256; other whole numbers with --scale
+    /// Map to evaluate: .pfm, float .tif or .npy, or 16-bit .png with disparity times 256; other integers with --scale
     map: PathBuf,
-    /// How many levels of whole numbers in MAP are one pixel of disparity; level 0 is unknown [default: 256 of a PNG with 16 bits]
+    /// Grey levels per pixel of disparity, for integers in MAP; level 0 is unknown [default: 256 for 16-bit PNG]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = scale)]
     scale: Option<f32>,
-    /// Ground truth, in one of the same formats, or whole numbers with --truth-scale; pixels that are invalid there do not
-    /// count
+    /// Ground truth in one of the same formats, or integers with --truth-scale; its invalid pixels are ignored
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
-    /// Mask: 255 where both views see the pixel, anything else where not
+    /// Mask: 255 for pixels seen by both views, anything else for others
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
     #[command(flatten)]
@@ -53,9 +52,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let ground = folder::ground_truth(reader, &args.truth, *truth_scale, mask, map, estimate.size())?;
     if is_negated(&estimate, ground.truth()) {
         let [map, truth] = [map, &args.truth].map(|path| path.display());
-        console::say(&format!(
-            "warning: {map} seems to count disparities the other way than {truth}: turn the sign of one of the two"
-        ));
+        console::say(&format!("warning: {map} and {truth} seem to use opposite signs: negate one of them"));
     }
     let name = map.file_stem().unwrap_or(map.as_os_str()).to_string_lossy().into_owned();
     let pictures = begun.as_ref().map(|_| report::pictures(&name, ground.truth(), &estimate, None));
@@ -65,7 +62,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     report::deliver(json, &findings, &metrics::text(&findings), begun, &pictures)
 }
 
-/// Whether a map is far nearer to the truth with its sign turned.
+/// Whether negating a map brings it much closer to the ground truth.
 fn is_negated(map: &Plane<f32>, truth: &Plane<f32>) -> bool {
     let both = || map.data().iter().zip(truth.data()).filter(|(d, truth)| d.is_finite() && truth.is_finite());
     let apart = |sign: f32| both().map(|(d, truth)| f64::from((sign * d - truth).abs())).sum::<f64>();

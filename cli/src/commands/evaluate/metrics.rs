@@ -6,10 +6,10 @@ use crate::table::Table;
 
 use super::findings::Findings;
 
-/// Most characters of a pair's name; longer names are cut.
+/// Maximum characters of a pair's name; longer names are cut.
 const NAME: usize = 12;
 
-/// A column: its head, that in a report, its largest width, its decimals, and its value.
+/// A column: heading, heading in a report, maximum width, decimals, and value.
 type Column = (&'static str, &'static str, usize, usize, fn(&Metrics) -> Option<f64>);
 
 pub(super) const COLUMNS: [Column; 8] = [
@@ -23,11 +23,10 @@ pub(super) const COLUMNS: [Column; 8] = [
     ("dens%", "density", 5, 2, |m| Some(m.density)),
 ];
 
-/// A table of all pairs and, from two pairs on, of their mean: one line for each map, at most 120 characters wide.
+/// A table with a line per map for all pairs and, for two or more pairs, their mean, at most 120 characters wide.
 ///
-/// `avg` and `RMS` are in pixels, `PSNR` in dB; `bN%` is the share of pixels that are wrong by more than N pixels or
-/// invalid, `dens%` the share of valid ones, both in percent. A dash marks what is missing, and a mean over fewer than all
-/// pairs is not shown.
+/// `avg` and `RMS` are in pixels, `PSNR` in dB; `bN%` is the share of pixels wrong by more than N pixels or invalid, `dens%` the share of
+/// valid pixels, both in percent. A dash marks a missing figure; a mean is only shown over all pairs.
 pub(super) fn text(findings: &Findings) -> String {
     let columns = "r".repeat(COLUMNS.len());
     let mut table = Table::new(&format!("ll|{columns}|{columns}"));
@@ -44,7 +43,7 @@ pub(super) fn text(findings: &Findings) -> String {
     table.to_string()
 }
 
-/// `name` in at most [`NAME`] characters, with a mark where it was cut.
+/// `name` in at most [`NAME`] characters, with a ~ if it was cut.
 pub(super) fn cut(name: &str) -> String {
     if name.chars().count() <= NAME {
         return name.into();
@@ -58,7 +57,7 @@ fn cells(metrics: Option<&Metrics>) -> impl Iterator<Item = String> {
     })
 }
 
-/// `value` with `decimals` decimals, or as many fewer as it takes to fit; marked as too large if none fits.
+/// `value` with up to `decimals` decimals as `width` allows; a lower bound such as >1e5 if not even the integer fits.
 fn number(value: f64, width: usize, decimals: usize) -> String {
     (0..=decimals)
         .rev()
@@ -115,11 +114,11 @@ mean         raw   | 4.000 37.34 100.0 100.0 56.25 56.25 4.00 87.50 | 4.000 37.3
         let text = table([first, row("second", 1.0, true)]);
         let lines: Vec<&str> = text.lines().skip(3).collect();
         assert_eq!(lines.len(), 5, "{text}");
-        // perfect where valid: no PSNR; no mask: no nonocc
+        // Valid pixels are perfect, so there is no PSNR; without a mask there is no nonocc.
         let start = "first  final | 0.000     - 12.50 12.50 12.50 12.50 0.00 87.50 |     -     -     -";
         assert!(lines[0].starts_with(start), "{text}");
         assert!(lines[1].starts_with("second raw   |"), "{text}");
-        // only one row has a raw map
+        // Only one row has a raw map.
         assert!(lines[4].starts_with("mean   final | 0.500     - "), "{text}");
     }
 

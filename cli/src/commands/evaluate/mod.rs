@@ -24,17 +24,16 @@ Examples:
   mrfgs evaluate HalfSize/Art --truth-scale 2
   mrfgs evaluate map mine.pfm --truth disp0GT.pfm --mask mask0nocc.png";
 
-/// Match pairs with known truth and print their errors
+/// Match pairs with ground truth and print their errors
 ///
-/// A DIR has the layout of one of the Middlebury sets, recognised by its files: im0.png, im1.png, disp0GT.pfm
-/// and calib.txt with ndisp (2014); view1.png, view5.png and disp1.png (2005, 2006); or im2.png, im6.png and
-/// disp2.png (2003). The truth of the older sets has 8 bits (see --truth-scale); without a calib.txt their
-/// range is from 0 to the largest known disparity, rounded up. A mask0nocc.png, if there is one, says which
-/// pixels both views see (255). If a folder is called like a command, write ./map.
+/// DIR has the layout of a Middlebury data set: im0.png, im1.png, disp0GT.pfm and calib.txt with ndisp (2014); view1.png, view5.png and
+/// disp1.png (2005, 2006); or im2.png, im6.png and disp2.png (2003). The ground truth of the older sets has 8 bits (see --truth-scale);
+/// without a calib.txt their range is from 0 to the largest known disparity, rounded up. An optional mask0nocc.png marks pixels seen by
+/// both views (255). For a folder named like a command, write ./map.
 ///
-/// The table shows the map before post-processing (raw) and the final one: average error, RMS (px), PSNR against 255 (dB),
-/// pixels wrong by more than 0.5, 1, 2 and 4 px or invalid (%), and valid ones (%), over all pixels with known truth and
-/// over those that both views see (nonocc).
+/// The table shows the map before post-processing (raw) and the final one: average error, RMS (px), PSNR against 255 (dB), pixels wrong by
+/// more than 0.5, 1, 2 and 4 px or invalid (%), and valid ones (%), over all pixels with ground truth and over those seen by both views
+/// (nonocc).
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(disable_help_subcommand = true)]
@@ -62,12 +61,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
 }
 
-/// Refuses the name of a mode among the folders: after a flag the parser takes it for one.
+/// Refuses the name of a mode among the folders: after a flag, the parser takes it for a folder.
 fn check_modes(args: &pairs::PairsArgs) -> Result<()> {
     let is_mode =
         |dir: &&PathBuf| dir.to_str().is_some_and(<Mode as Subcommand>::has_subcommand) && !dir.is_dir();
     match args.dirs.iter().find(is_mode) {
-        Some(mode) => Err(Failure::usage(mode.display(), "give it right after `evaluate`, before all flags")),
+        Some(mode) => Err(Failure::usage(mode.display(), "put it right after `evaluate`, before all flags")),
         None => Ok(()),
     }
 }

@@ -1,4 +1,4 @@
-//! `mrfgs evaluate DIR...`: pairs are matched and compared with their truth.
+//! `mrfgs evaluate DIR...`: matches pairs and compares the maps with their ground truth.
 
 use std::path::PathBuf;
 
@@ -9,31 +9,29 @@ use super::report::{self, ReportArgs};
 use super::scenes::RunArgs;
 use super::{breakdown, metrics};
 
-/// What to match and print.
+/// The arguments of an evaluation.
 #[derive(clap::Args)]
 pub(super) struct PairsArgs {
     /// Folders to match and evaluate
     #[arg(required = true, value_name = "DIR")]
     pub(super) dirs: Vec<PathBuf>,
-    /// Prints two more tables: where the errors of the final map are, and how good confidence and validity are
+    /// Prints two more tables: where errors of the final map occur, and how good confidence and validity are
     ///
-    /// The first table puts every pixel with known truth into the first class that applies: border (its match, x - truth, lies
-    /// outside the right image), occluded (the mask says that one view does not see it), edge (the known truths in the
-    /// 7 x 7 window around it span more than 4 px), plain (the grey in this window has a standard deviation below 4
-    /// eight-bit levels), slanted (the truth changes by at least 0.2 px per pixel), other. For each class it shows `share`,
-    /// its pixels, and `bad`, those of them that are wrong by more than 2 px or invalid, both in percent of all pixels with
-    /// known truth: the bad ones of all classes add up to b2%.
+    /// The first table puts every pixel with ground truth into the first class that applies: border (its match, x - truth, lies outside the
+    /// right image), occluded (according to the mask, one view does not see it), edge (known truths in the surrounding 7 x 7 window span
+    /// more than 4 px), plain (the grey values in this window have a standard deviation below 4 eight-bit levels), slanted (the truth
+    /// changes by at least 0.2 px per pixel), other. For each class it shows `share`, its pixels, and `bad`, those wrong by more than 2 px
+    /// or invalid, both in percent of all pixels with ground truth: the bad ones of all classes add up to b2%.
     ///
-    /// The second table orders the pixels by confidence, the surest first (Hu and Mordohai 2012). `AUC` is the mean over all k
-    /// of the share of bad pixels among the k surest (%); it is small if the confidence is low where pixels are bad. `optimal`
-    /// is the AUC if all bad pixels came last, `random` that of a confidence that knows nothing. `precision` is the share of
-    /// pixels that one view does not see, by the mask, among those flagged as outside, occluded or in a small region;
-    /// `recall` is the share of flagged pixels among those that one view does not see.
+    /// The second table orders the pixels by decreasing confidence (Hu and Mordohai 2012). `AUC` is the mean over all k of the share of bad
+    /// pixels among the k most confident (%), small for a good confidence. `optimal` is the AUC with all bad pixels last, `random` that of
+    /// a random order. `precision` is the share of pixels that one view does not see, according to the mask, among those flagged as
+    /// outside, occluded or in a small region; `recall` is the share of flagged pixels among those that one view does not see.
     ///
-    /// --json holds these figures for each pair and for the mean in any case: `breakdown` by class (`share`; `bad2.0` and
-    /// `avg` of its own pixels; `points`, the `bad` above; `of_bad` and `of_squares`, its share of all bad pixels and of the
-    /// summed squared error), `confidence` (`auc`, `optimal`, `random`, and `curve`, the share of bad pixels among the surest
-    /// 5, 10, ... 100 %) and `validity` (`precision`, `recall`; null without a mask).
+    /// --json always contains these figures for each pair and the mean: `breakdown` by class (`share`; `bad2.0` and `avg` over its own
+    /// pixels; `points`, the `bad` above; `of_bad` and `of_squares`, its share of all bad pixels and of the summed squared error),
+    /// `confidence` (`auc`, `optimal`, `random`, and `curve`, the share of bad pixels among the 5, 10, ... 100 % most confident) and
+    /// `validity` (`precision`, `recall`; null without a mask).
     #[arg(long)]
     breakdown: bool,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! The page of pictures and figures that `--report` writes.
+//! The page with pictures and figures that `--report` writes.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -20,34 +20,32 @@ use crate::text::figure;
 use super::findings::{Figures, Findings};
 use super::metrics::COLUMNS;
 
-/// Errors beyond this, in pixels, take the last colour: one scale for all pairs, or they could not be compared.
+/// The error in pixels at the end of the colour scale, the same for all pairs so that they can be compared.
 const ERROR_LIMIT: f32 = 4.0;
 
-/// The page's name in the folder.
+/// The page's file name.
 const PAGE: &str = "index.html";
 
-/// The beginning of the tag that tells a report from other pages.
+/// The start of the tag that identifies a report.
 const GENERATOR: &str = r#"<meta name="generator" content="mrfgs "#;
 
-/// The attribute with the name of a picture's file: the page names all files of the report.
+/// The attribute with the file name of a picture; the page names all files of the report.
 const FILE: &str = "data-file=";
 
-/// Whether to write a report, and where.
+/// The flag of a report.
 #[derive(clap::Args)]
 pub(super) struct ReportArgs {
-    /// Writes a page with all figures and pictures, index.html, and the pictures as PNG files
+    /// Writes a page with all figures and pictures (index.html), and the pictures as PNG files
     ///
-    /// For each pair it shows the left view, its texture zones, disparity and truth in the same colours, the signed error
-    /// (estimate minus truth), confidence and validity; for a finished map only the maps. The page needs no other file and no
-    /// network. An existing folder must be empty or hold nothing but an earlier report (its index.html names mrfgs as its
-    /// generator), which is replaced.
+    /// For each pair it shows the left view, its texture zones, disparity and ground truth in the same colours, the signed error (estimate
+    /// minus truth), confidence and validity; for a finished map only the maps. The page needs no other files and no network. An existing
+    /// folder must be empty or contain only an earlier report (its index.html names mrfgs as its generator), which is replaced.
     #[arg(long, value_name = "FOLDER")]
     report: Option<PathBuf>,
 }
 
 impl ReportArgs {
-    /// Begins the report before any computing: in a new folder, an empty one, or one that holds nothing but an earlier report.
-    /// Refuses `json` inside it.
+    /// Begins the report before any computing, in a folder that is new, empty or an earlier report. Refuses `json` inside it.
     pub(super) fn begin(&self, json: Option<&Path>) -> Result<Option<StagedFolder>> {
         let staged = self.report.as_deref().map(StagedFolder::new).transpose()?;
         if let Some(staged) = &staged {
@@ -58,7 +56,7 @@ impl ReportArgs {
     }
 }
 
-/// Refuses a folder with files that no report has written: they would be lost.
+/// Refuses a folder with other files, which would be lost.
 fn refuse_strangers(staged: &StagedFolder) -> mrfgs::Result<()> {
     if !staged.place().exists() {
         return Ok(());
@@ -70,7 +68,7 @@ fn refuse_strangers(staged: &StagedFolder) -> mrfgs::Result<()> {
         let ours = name == PAGE || page.contains(&format!("{FILE}\"{name}\""));
         if !(page.contains(GENERATOR) && ours) {
             return Err(staged.error(format!(
-                "the folder holds {name}, which is no part of an earlier report; give a new folder or empty it"
+                "the folder contains {name}, which is not part of an earlier report; give a new folder or empty it"
             )));
         }
     }
@@ -79,25 +77,25 @@ fn refuse_strangers(staged: &StagedFolder) -> mrfgs::Result<()> {
 
 /// A picture of a pair, as PNG.
 pub(super) struct Picture {
-    /// The end of its file's name.
+    /// The end of the file name.
     file: &'static str,
     title: &'static str,
-    /// What it shows, for those who cannot see it.
+    /// The alternative text.
     alt: String,
-    /// Its legend, in HTML.
+    /// The legend, in HTML.
     legend: String,
     size: (usize, usize),
     png: Vec<u8>,
 }
 
-/// The pictures of one pair, in the order of the page; a finished map has nothing `matched`.
+/// The pictures of one pair, in the order of the page; `matched` is `None` for a finished map.
 pub(super) fn pictures(
     name: &str,
     truth: &Plane<f32>,
     estimate: &Plane<f32>,
     matched: Option<(&Pair, &Maps)>,
 ) -> Result<Vec<Picture>> {
-    // Estimate and truth share the truth's scale.
+    // Estimate and ground truth share the scale of the ground truth.
     let known = || truth.data().iter().copied().filter(|d| d.is_finite());
     let (min, max) = (known().fold(f32::INFINITY, f32::min), known().fold(f32::NEG_INFINITY, f32::max));
     let (min, max) = (min.floor(), max.ceil().max(min.floor() + 1.0));
@@ -125,15 +123,15 @@ pub(super) fn pictures(
     add("truth", "Ground truth", &format!("true disparity, {scale}"), legend, &picture)?;
     let alt = "estimate minus truth, blue where too small, red where too large";
     let legend = format!(
-        "Estimate minus truth, -{ERROR_LIMIT} to {ERROR_LIMIT} px and beyond. Blue: too far, red: too near; grey: \
+        "Estimate minus truth, -{ERROR_LIMIT} to {ERROR_LIMIT} px and beyond. Blue: too far, red: too near, grey: \
          truth unknown, black: no estimate."
     );
     add("error", "Signed error", alt, legend, &colour::error(estimate, truth, ERROR_LIMIT))?;
     if let Some((_, maps)) = matched {
         let alt = "confidence of every pixel, bright is sure";
-        let legend = "0 to 255, bright is sure: how far the runner-up label is behind the best one, in 1/8 nat, on average around.";
+        let legend = "How sure each pixel is, 0 to 255; bright is sure. The lead of the best disparity over the runner-up in 1/8 nat, averaged over neighbouring pixels.";
         add("confidence", "Confidence", alt, legend.into(), &colour::grey(&maps.confidence))?;
-        let (alt, picture) = ("why each pixel is what it is", colour::validity(&maps.validity));
+        let (alt, picture) = ("the status of each pixel", colour::validity(&maps.validity));
         add("validity", "Validity", alt, validity_legend(), &picture)?;
     }
     Ok(all)
@@ -143,7 +141,7 @@ fn validity_legend() -> String {
     let mut out = String::new();
     for (bit, [r, g, b]) in colour::VALIDITY {
         let reason = REASONS.iter().find(|reason| u32::from(reason.0) == bit);
-        let (_, name, about) = reason.expect("each colour is that of a reason");
+        let (_, name, about) = reason.expect("every colour has a reason");
         let _ = write!(
             out,
             r#"<span class="class" title="{about}"><i style="background:rgb({r},{g},{b})"></i>{bit} {name}</span> "#
@@ -152,8 +150,8 @@ fn validity_legend() -> String {
     out + "Half as bright: no disparity. Otherwise pixels of 1, 2, 4, 64 and 128 are filled (16)."
 }
 
-/// Delivers the findings as JSON or `text`, and where a report is `begun` that: the page, with its pictures in it, and the pictures
-/// as files, all of them or none, in place of an earlier report.
+/// Writes the findings as JSON and prints `text`, and for a report that was `begun` writes the page with embedded pictures and the picture
+/// files. An earlier report is replaced as a whole, or not at all.
 pub(super) fn deliver(
     json: Option<&Path>,
     findings: &Findings,
@@ -175,7 +173,7 @@ pub(super) fn deliver(
     })
 }
 
-/// The name of a picture's file: unique, and harmless in a page and on every file system.
+/// The file name of a picture: unique, and safe in a page and on every file system.
 fn file_name(pair: usize, name: &str, picture: &Picture) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
     let name: String = name.chars().map(plain).take(40).collect();
@@ -212,7 +210,7 @@ img { display: block; width: 100%; height: auto; image-rendering: pixelated; }
 pre { columns: 24rem; font-size: .87rem; white-space: pre-wrap; }
 ";
 
-/// The whole page.
+/// The complete page.
 fn page(findings: &Findings, pictures: &[Vec<Picture>]) -> String {
     let names: Vec<_> = findings.pairs.iter().map(|pair| pair.name.as_str()).collect();
     let version = env!("CARGO_PKG_VERSION");
@@ -232,7 +230,7 @@ fn page(findings: &Findings, pictures: &[Vec<Picture>]) -> String {
         escaped(&ran_on)
     );
 
-    // All pairs, all pixels.
+    // All pairs, over all pixels.
     let mut rows = Vec::new();
     for pair in &findings.pairs {
         rows.extend(pair.figures.maps().map(|(map, report)| ("", &*pair.name, map, &report.all)));
@@ -277,7 +275,7 @@ fn page(findings: &Findings, pictures: &[Vec<Picture>]) -> String {
     out
 }
 
-/// A table of metrics: the class, the two names and the metrics of each row.
+/// A table of metrics; each row has a CSS class, two names and the metrics.
 fn table<'a>(
     out: &mut String,
     heads: [&str; 2],
@@ -306,7 +304,7 @@ fn table<'a>(
     out.push_str("</table></div>\n");
 }
 
-/// Where the errors of a pair's final map are, and how good its confidence and validity are; nothing for a finished map.
+/// The breakdown of errors of a pair's final map, and the quality of its confidence and validity; nothing for a finished map.
 fn breakdown(out: &mut String, figures: &Figures) {
     if let Some(breakdown) = &figures.breakdown {
         out.push_str(
@@ -333,7 +331,7 @@ fn breakdown(out: &mut String, figures: &Figures) {
     }
 }
 
-/// A text with the special characters of HTML escaped, for attributes too.
+/// Escapes the special characters of HTML, also for attributes.
 fn escaped(text: &str) -> String {
     let escapes = [("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ("\"", "&quot;"), ("'", "&#39;")];
     escapes.into_iter().fold(text.to_owned(), |text, (special, escape)| text.replace(special, escape))

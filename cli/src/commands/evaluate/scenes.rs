@@ -1,4 +1,4 @@
-//! Pairs with known truth: read, matched, and compared with it.
+//! Reads pairs with ground truth, matches them, and compares the maps.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -15,24 +15,24 @@ use crate::pairs::folder::{self, Folder, Scene};
 
 use super::findings::{Figures, Findings, Scored};
 
-/// How pairs and their truth are read, and where the figures go.
+/// Flags for reading the ground truth and writing the figures.
 #[derive(clap::Args)]
 pub(super) struct SceneArgs {
     /// Writes all figures as JSON; `-` prints them instead of the table
     #[arg(long, value_name = "FILE")]
     pub(super) json: Option<PathBuf>,
-    /// Levels of a truth of whole numbers that are one pixel of disparity; level 0 is unknown [default: 256 of a PNG with 16 bits, 3
-    /// for the layout of 2005 and 2006, 4 for that of 2003]
+    /// Grey levels per pixel of disparity, for an integer ground truth; level 0 is unknown [default: 256 for 16-bit PNG, 3 for the layout
+    /// of 2005 and 2006, 4 for that of 2003]
     ///
-    /// The defaults are those of the small sizes, third and quarter. Of 2005 and 2006 the full size has 1, the half size 2,
-    /// the third size 3.
+    /// The defaults fit the small sizes, third and quarter. For 2005 and 2006 use 1 for the full size, 2 for the half size and 3 for the
+    /// third size.
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = scale)]
     pub(super) truth_scale: Option<f32>,
     #[command(flatten)]
     pub(super) reading: ReadingArgs,
 }
 
-/// How pairs with their truth are read and matched.
+/// Flags for reading and matching pairs with ground truth.
 #[derive(clap::Args)]
 pub(super) struct RunArgs {
     #[command(flatten)]
@@ -58,18 +58,18 @@ impl RunArgs {
         self.execution.execution()
     }
 
-    /// The folders, all complete: what is missing in the last is said before the first is matched.
+    /// The folders, all checked: missing files are reported before the first match.
     fn folders<'a>(&self, dirs: &'a [PathBuf]) -> Result<Vec<Folder<'a>>> {
         let folders = dirs.iter().map(|dir| Folder::of(dir)).collect::<mrfgs::Result<Vec<_>>>()?;
         if self.scenes.truth_scale.is_some() && !folders.iter().any(Folder::is_scaled) {
-            let reason = "no folder holds a truth of 8 bits, and disp0GT.pfm is in pixels; leave it out";
+            let reason = "no folder has an 8-bit ground truth, and disp0GT.pfm is in pixels; remove it";
             return Err(Failure::usage("--truth-scale", reason));
         }
         Ok(folders)
     }
 
-    /// Matches every folder by `method`; `see` gets every pair with its maps and their time. Finds out before any computing whether
-    /// the JSON can be written, and refuses it in place of a file that is read.
+    /// Matches every folder by `method` and passes each pair with its maps and time to `see`. Checks before any computing that the JSON can
+    /// be written and does not overwrite an input.
     pub(super) fn match_all(
         &self,
         dirs: &[PathBuf],

@@ -1,7 +1,7 @@
 //! `mrfgs evaluate submission`: maps in the format of the Middlebury stereo evaluation (version 3).
 //!
-//! Its upload format has a folder for each pair with `disp0METHOD.pfm`, or `disp0METHOD_s.pfm` where the method leaves pixels
-//! without a disparity, and `timeMETHOD.txt`, which holds nothing but the seconds.
+//! The upload has a folder per pair with `disp0METHOD.pfm`, or `disp0METHOD_s.pfm` if the method leaves pixels without a disparity, and
+//! `timeMETHOD.txt`, which contains only the seconds.
 
 use std::ffi::{OsStr, OsString};
 use std::fs;
@@ -24,22 +24,21 @@ const EXAMPLES: &str = "\
 Examples:
   mrfgs evaluate submission trainingQ MRFGS MiddEval3/trainingQ/*";
 
-/// Match pairs and write their maps as the Middlebury evaluation (version 3) takes them
+/// Match pairs and write their maps for the Middlebury evaluation (version 3)
 ///
-/// For each pair it writes DIR/PAIR/disp0METHOD.pfm, with +infinity where there is no disparity, and
-/// DIR/PAIR/timeMETHOD.txt, the time of the match in seconds; PAIR is the name of the pair's folder. Without a fill (--set
-/// fill=none) a map counts as sparse, and its METHOD is followed by _s. It also prints the errors, as `evaluate` does.
+/// For each pair it writes DIR/PAIR/disp0METHOD.pfm, with +infinity for unknown disparities, and DIR/PAIR/timeMETHOD.txt, the time of the
+/// match in seconds; PAIR is the name of the pair's folder. With --set fill=none a map counts as sparse, and _s follows METHOD. It also
+/// prints the errors, as `evaluate` does.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Folder to write, new or empty; the evaluation wants it called trainingF, trainingH or trainingQ by the size of
-    /// the pairs
+    /// Folder to write, new or empty; the evaluation expects the name trainingF, trainingH or trainingQ according to the size of the pairs
     #[arg(value_name = "DIR")]
     folder: PathBuf,
     /// Name of the method: letters, digits, - and _
     #[arg(value_name = "METHOD")]
     called: OsString,
-    /// Folders with the pairs, as `evaluate` takes them
+    /// Folders with the pairs, as for `evaluate`
     #[arg(value_name = "PAIR", required = true)]
     dirs: Vec<PathBuf>,
     #[command(flatten)]
@@ -62,39 +61,42 @@ pub(super) fn run(args: &Args) -> Result<()> {
     })
 }
 
-/// A folder of maps in the making.
+/// A submission being written.
 struct Submission {
     folder: StagedFolder,
     method: String,
-    /// Behind the method in the names of maps.
+    /// The suffix of METHOD in the names of maps.
     ending: &'static str,
 }
 
 impl Submission {
-    /// Begins the folder `dir`, a new or an empty one, for the pairs called `names`.
+    /// Begins the folder `dir`, new or empty, for pairs with these `names`.
     fn new(dir: &Path, method: &OsStr, names: &[String], fill: Fill) -> Result<Self> {
         let error = |name: &str, reason: String| Err(Failure::usage(name, reason));
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         let Some(method) = method.to_str().filter(|m| !m.is_empty() && m.chars().all(plain)) else {
             return error(
                 "METHOD",
-                format!("{} is no name for files: give letters, digits, - and _", method.display()),
+                format!("{} cannot be part of a file name: use letters, digits, - and _", method.display()),
             );
         };
         if method.ends_with("_s") {
             return error(
                 "METHOD",
-                format!("{method} ends in _s, the mark of sparse maps; give another name"),
+                format!("{method} ends in _s, which marks sparse maps; give another name"),
             );
         }
         if let Some(twice) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
-            return error("PAIR", format!("two pairs are called {}; rename the folder of one", twice.1));
+            return error(
+                "PAIR",
+                format!("two pairs are called {}; rename the folder of one of them", twice.1),
+            );
         }
         let ending = if fill == Fill::None { "_s" } else { "" };
         Ok(Self { folder: StagedFolder::new_or_empty(dir)?, method: method.into(), ending })
     }
 
-    /// Adds the map of a pair and the time that it took.
+    /// Adds the map and the time of a pair.
     fn add(&self, name: &str, map: &Plane<f32>, time: Duration) -> Result<()> {
         let Self { folder, method, ending } = self;
         let dir = folder.path().join(name);

@@ -1,4 +1,4 @@
-//! `mrfgs inspect`: what happens inside a match, for developers.
+//! `mrfgs inspect`: the inside of a match, for developers.
 
 mod steps;
 
@@ -26,24 +26,22 @@ Examples:
   mrfgs inspect left.png right.png --max-disparity 63
   mrfgs inspect im0.png im1.png steps --method paper";
 
-/// Match a pair and print the time of every stage; with DIR, show every step as a picture
+/// Match a pair and time every stage; with DIR, show every step as a picture
 ///
-/// The times are by the device's own clock if it has one. `rest` is all other time: with DIR, mostly that of
-/// the pictures.
+/// Times come from the device's own clock if it has one. `rest` is all other time: with DIR, mostly that of the pictures.
 ///
-/// DIR gets pictures and small tables: corrected images, zones, matches, label ranges, costs, graphs, a map
-/// of each level, and the change of each iteration. With DIR a match takes several times as long, and it must
-/// fit into --memory in one piece.
+/// DIR gets pictures and small tables: corrected images, zones, sparse matches, label ranges, costs, graphs, a map per level, and the
+/// change per iteration. With DIR a match takes several times as long and must fit into --memory without tiles.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
     #[command(flatten)]
     pair: PairArgs,
-    /// Folder for the steps, new or empty
+    /// Folder for the pictures, new or empty
     #[arg(value_name = "DIR")]
     folder: Option<PathBuf>,
 
-    /// Writes what ran as JSON; `-` prints it instead of the table
+    /// Writes a record of the match as JSON; `-` prints it instead of the table
     ///
     /// The fields are those of `match --json`, and `stages` (ms by stage and level).
     #[arg(long, value_name = "FILE")]
@@ -86,7 +84,7 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     })
 }
 
-/// Finds out before any computing whether the outputs can be written.
+/// Checks before any computing that the outputs can be written.
 fn check_outputs(args: &Args, input: &Input, folder: Option<&StagedFolder>) -> Result<()> {
     let json = files::json_file(args.json.as_deref());
     match folder {
@@ -99,7 +97,7 @@ fn check_outputs(args: &Args, input: &Input, folder: Option<&StagedFolder>) -> R
     files::distinct(&inputs, &folder.into_iter().chain(json.map(|json| ("--json", json))).collect::<Vec<_>>())
 }
 
-/// The time of every stage; `whole` is that of the match.
+/// The table of stage times; `whole` is the time of the match.
 fn times(matched: &Matched, whole: Duration) -> String {
     let Matched { timings, traffic, .. } = matched;
     let mut table = Table::new("lrrr");

@@ -1,4 +1,4 @@
-//! Every step of a match as a picture or a small table.
+//! Writes every step of a match as a picture or a small table.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -17,10 +17,10 @@ use mrfgs::options::Illumination;
 
 use crate::outputs::StagedFolder;
 
-/// Quarters of the label range at which cost slices are cut.
+/// Quarters of the label range at which costs are shown.
 const SLICES: [usize; 3] = [1, 2, 3];
 
-/// Collects files in a folder, which appears once all are there.
+/// Collects files in a folder, which appears once it is complete.
 pub(super) struct Steps {
     folder: StagedFolder,
     plan: Plan,
@@ -33,7 +33,7 @@ impl Steps {
         Self { folder, plan, changes: String::new(), last: None }
     }
 
-    /// Writes what a match shows on its way.
+    /// Writes the step that `inspection` shows.
     pub(super) fn look(&mut self, inspection: &mut Inspection) -> Result<()> {
         self.show(inspection).map_err(|e| self.folder.named(e))
     }
@@ -54,7 +54,7 @@ impl Steps {
         }
     }
 
-    /// Puts the folder in its place.
+    /// Moves the folder to its place.
     pub(super) fn finish(self) -> Result<()> {
         let saved = write::save(&self.path("change-per-iteration.csv"), self.changes.as_bytes());
         saved.map_err(|e| self.folder.named(e))?;
@@ -65,7 +65,7 @@ impl Steps {
         self.folder.path().join(name)
     }
 
-    /// A map in colours.
+    /// Writes a map in colours.
     fn map(&self, name: &str, map: &Plane<f32>, min: f32, max: f32) -> Result<()> {
         let picture = colour::preview(map, min, max, ColourMap::default());
         write::picture(&self.path(&format!("{name}.png")), &picture)
@@ -94,7 +94,7 @@ impl Steps {
     fn zones(&self, pair: &Pair, zones: &Zones, matches: &[SparseMatch]) -> Result<()> {
         let (width, height) = pair.size();
         write::picture(&self.path("zones.png"), &zones.map.map(|&zone| colour::zone(zone)))?;
-        // Both views side by side, a line from each corner to its match.
+        // Both views side by side; matching points have the same colour.
         let (left, right) = (pair.left().to_rgb8(), pair.right().to_rgb8());
         let mut both = Plane::from_fn(2 * width, height, |x, y| {
             let [r, g, b] = if x < width { left[(x, y)] } else { right[(x - width, y)] };
@@ -118,7 +118,7 @@ impl Steps {
         write::save(&self.path("matches.csv"), table.as_bytes())
     }
 
-    /// In how many dependency factors each pixel is.
+    /// Writes the number of dependency factors of each pixel.
     fn degree(&self, z: usize, graph: &LevelGraph) -> Result<()> {
         let degrees = Plane::from_fn(graph.width(), graph.height(), |x, y| {
             graph.incoming_of(y * graph.width() + x).len() as f32
@@ -126,7 +126,7 @@ impl Steps {
         self.map(&format!("graph-degree-level-{z}"), &degrees, 0.0, 4.0 * graph.slots() as f32)
     }
 
-    /// The cost of single labels.
+    /// Writes the costs of single labels.
     fn slices(&self, backend: &mut dyn Backend, z: usize) -> Result<()> {
         let level = &self.plan.levels[z];
         let cost = backend.probe().read(Volume::Cost(z))?;
@@ -142,7 +142,7 @@ impl Steps {
         Ok(())
     }
 
-    /// The map of every level, and how undecided the finest is.
+    /// Writes the map of every level, and the entropy of the finest beliefs.
     fn levels(&self, backend: &mut dyn Backend) -> Result<()> {
         for (z, level) in self.plan.levels.iter().enumerate() {
             let belief = backend.probe().read(Volume::Belief(z))?;
@@ -164,7 +164,7 @@ impl Steps {
         let belief = backend.probe().read(Volume::Belief(0))?;
         let map: Vec<usize> = belief.chunks_exact(self.plan.levels[0].labels).map(optimum).collect();
         if iteration == 0 {
-            // The start, also of another try where the device failed.
+            // A match starts, perhaps again after the device failed.
             self.changes = "iteration,rms_change_px\n".into();
         } else if let Some(last) = &self.last {
             let squares: f64 = map.iter().zip(last).map(|(&a, &b)| (a.abs_diff(b) as f64).powi(2)).sum();
@@ -181,7 +181,7 @@ fn optimum(belief: &[u32]) -> usize {
     (0..belief.len()).min_by_key(|&i| belief[i]).unwrap_or(0)
 }
 
-/// Entropy of the label's distribution that a belief stands for, in nats.
+/// Entropy of the label distribution that a belief represents, in nats.
 fn entropy(belief: &[u32]) -> f32 {
     let least = belief.iter().min().copied().unwrap_or(0);
     let weights: Vec<f64> = belief.iter().map(|&b| (-f64::from(b - least) / UNITS_PER_NAT).exp()).collect();

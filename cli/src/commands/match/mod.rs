@@ -20,42 +20,39 @@ Examples:
   mrfgs match l.tif r.tif d.tif --min-disparity -40 --max-disparity 25
   mrfgs match l.png r.png d.png --max-disparity 90 --also confidence
   mrfgs match l.png r.png - --max-disparity 63 | other-program
-  # Holes where the views do not agree:
+  # Keep holes where the views disagree:
   mrfgs match l.png r.png d.pfm --max-disparity 90 --set fill=none
-  # The plan, with its memory, without running:
+  # Print the plan and its memory without running it:
   mrfgs match l.png r.png d.pfm --max-disparity 255 --dry-run
-  # Range and cameras from the calib.txt beside im0.png:
+  # Depth, with range and cameras from the calib.txt beside im0.png:
   mrfgs match im0.png im1.png d.pfm --also depth,points
-  # A part of a large pair:
+  # Part of a large pair:
   mrfgs match l.tif r.tif d.tif --max-disparity 255 --roi 4000,2500,800,600
   # Depth without a calibration file:
   mrfgs match l.png r.png d.pfm --focal 700 --baseline 120mm --also depth
   # Both views in one file of a stereo camera:
   mrfgs match photo.mpo d.pfm --rectify
-  # Two photographs of one camera, without a calibration:
+  # Two hand-held photos, without a calibration:
   mrfgs match l.jpg r.jpg d.pfm --rectify
   # Raw images and a calibration:
   mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
-  # Points as LAZ, in the frame of the left camera as it took the image:
+  # Points as LAZ, in the frame of the left camera before rectification:
   mrfgs match l.png r.png d.pfm --rectify --calib c --also points-original.laz";
 
-/// Match a rectified pair and write its disparity map
+/// Match a pair of images and write its disparity map
 ///
-/// LEFT is the reference view; all maps have its size. Images are PNG, JPEG, PNM, TIFF, BMP, PFM or NPY, recognised by their
-/// content. Pixels that are transparent, not finite, or without data are ignored.
+/// LEFT is the reference view; all maps have its size. Images are PNG, JPEG, PNM, TIFF, BMP, PFM or NPY, whatever their extension.
+/// Transparent, non-finite and no-data pixels are ignored.
 ///
-/// The extension of OUTPUT says how disparities (in pixels) are stored: .pfm as float with +infinity for
-/// invalid pixels, .tif or .tiff as float with NaN and with the georeference of LEFT, .png as in KITTI: 16
-/// bits with disparity times 256 and 0 for invalid pixels (ranges within 0 to 255 only; a disparity of 0
-/// becomes 1/256). `-` writes PFM to standard output. If OUTPUT is a symbolic link, the file it leads to is
-/// written.
+/// The extension of OUTPUT selects how disparities (in pixels) are stored: .pfm as float with +infinity for invalid pixels; .tif or .tiff
+/// as float with NaN and the georeference of LEFT; .png as in KITTI, 16 bits with disparity times 256 and 0 for invalid pixels (ranges
+/// within 0 to 255 only; a disparity of 0 becomes 1/256). `-` writes PFM to standard output. A symbolic link is followed.
 ///
-/// Depth and points need the cameras of a calibration: P1 and P2 of OpenCV, the projections of ROS, or
-/// Middlebury's cam0=[f 0 cx; 0 f cy; 0 0 1] (pixels), doffs (cx1 - cx0, pixels) and baseline; with --rectify
-/// any that `mrfgs rectify` takes. Depth is Z = baseline * f / (d + doffs) along the optical axis, in the
-/// unit of the baseline: metres with ROS and Kalibr, millimetres with Middlebury, that of the chessboard with
-/// OpenCV. Where d + doffs is 0 or less there is no depth. An entry `unit` in the file (mm, cm or m) states
-/// the unit. --focal and --baseline take the place of a calibration whose doffs is 0.
+/// Depth and points need a calibration: P1 and P2 of OpenCV, the projections of ROS, or Middlebury's cam0=[f 0 cx; 0 f cy; 0 0 1] (pixels),
+/// doffs (cx1 - cx0, pixels) and baseline; with --rectify, any that `mrfgs rectify` reads. Depth is Z = baseline * f / (d + doffs) along
+/// the optical axis, in the unit of the baseline: metres with ROS and Kalibr, millimetres with Middlebury, the unit of the chessboard with
+/// OpenCV. An entry `unit` in the file (mm, cm or m) states it. If d + doffs is 0 or less there is no depth. --focal and --baseline replace
+/// a calibration whose doffs is 0.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -68,13 +65,11 @@ pub(crate) struct Args {
     /// Disparity map to write: .pfm, .tif, .tiff or .png, or `-`
     output: Option<PathBuf>,
 
-    /// Sign convention of disparities, in the range, OUTPUT and --also raw; the Ames Stereo Pipeline takes
-    /// right-minus-left
+    /// Sign convention of disparities, for the range, OUTPUT and --also raw; the Ames Stereo Pipeline uses right-minus-left
     #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
     sign: Sign,
-    /// LEFT and RIGHT are raw images: rectifies them first, as `mrfgs rectify` does, by --calib, or without it by
-    /// their own matches; then there is no depth, and a calib.txt beside LEFT does not count. All outputs are of
-    /// the rectified left view
+    /// Rectifies raw images first, as `mrfgs rectify` does: with --calib, or without a calibration from matches between the images (then
+    /// there is no depth, and a calib.txt beside LEFT is ignored). All outputs belong to the rectified left view
     #[arg(long)]
     rectify: bool,
     #[command(flatten)]
@@ -93,17 +88,14 @@ pub(crate) struct Args {
 
     #[command(flatten)]
     also: AlsoArgs,
-    /// Writes what ran and what it found as JSON; `-` prints it
+    /// Writes a record of the match and its result as JSON; `-` prints it
     ///
-    /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `rectified`,
-    /// `trust` (where it was by matches alone: `matches`, `agreeing`, `median` and `percentile95` of the
-    /// distance of rows in pixels, `coverage` and `off_one_plane` from 0 to 1), `region` (its first column and
-    /// row in LEFT, with --roi), `width`, `height`, `sign`, `range` (`min`, `max`), `labels`, `method` (every
-    /// key), `ran_on`, `driver`
-    /// (of the device), `note` (why another device was taken), `tiles`, `moved_up` (by how many pixels the
-    /// right view was moved up), `smoothed` (how much the left and the right view were smoothed: standard
-    /// deviations, in pixels), `iterations` and `seconds` (of the match). `density` is the share of pixels
-    /// with a disparity (%), the sum of `measured` and `filled`. `mean_confidence` is that of the measured
+    /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `rectified`, `trust` (rectified without a
+    /// calibration: `matches`, `agreeing`, `median` and `percentile95` of the row errors in pixels, `coverage` and `off_one_plane` from 0
+    /// to 1), `region` (first column and row in LEFT, with --roi), `width`, `height`, `sign`, `range` (`min`, `max`), `labels`, `method`
+    /// (every key), `ran_on`, `driver` (of the device), `note` (why another device was used), `tiles`, `moved_up` (shift of the right view
+    /// in pixels), `smoothed` (standard deviations for the left and the right view, in pixels), `iterations` and `seconds` (of the match).
+    /// `density` is the share of pixels with a disparity (%), the sum of `measured` and `filled`. `mean_confidence` averages over measured
     /// pixels.
     #[arg(long, value_name = "FILE", help_heading = "More outputs")]
     json: Option<PathBuf>,
@@ -118,10 +110,7 @@ impl Args {
 pub(crate) fn run(mut args: Args) -> Result<()> {
     args.pair.leave(&mut args.output)?;
     if args.output.is_none() {
-        return Err(Failure::usage(
-            "OUTPUT",
-            "it is missing; give a file for the map, such as disparity.pfm",
-        ));
+        return Err(Failure::usage("OUTPUT", "missing; give a file for the map, such as disparity.pfm"));
     }
     let args = &args;
     let execution = args.execution.execution();
@@ -134,8 +123,7 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     if args.rectify && args.pair.calib.is_empty() {
         let flag = cameras.map(Also::flag).or(args.numbers.flag().map(str::to_owned));
         if let Some(flag) = flag {
-            let reason =
-                "matches alone show no scale, and so no depth; give a calibration of the cameras by --calib";
+            let reason = "without a calibration there is no scale and so no depth; add --calib FILE";
             return Err(Failure::usage(flag, reason));
         }
     }
@@ -171,7 +159,7 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
         input.say_wider(&matched, args.sign, "");
         input::warn(matched.warnings().into_iter().map(|warning| args.sign.warning(warning)));
     }
-    // Outputs take memory too.
+    // Free its memory for the outputs.
     drop(matcher);
     let files = args.pair.files(&input, Some(args.output()));
     let unit = input.unit();
@@ -215,12 +203,12 @@ fn empty(args: &Args, outcome: &Outcome, is_found: bool) -> Option<String> {
     in_front.doubt(&turned, check).or_else(|| args.also.left_out(outcome))
 }
 
-/// Finds out before any computing whether all outputs can be written. Returns the files of `--also`.
+/// Checks before any computing that all outputs can be written. Returns the files of `--also`.
 fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathBuf)>> {
     let output = args.output();
     if files::is_printed(output) {
         if let Some(word) = args.also.wanted().next() {
-            let reason = "is written beside OUTPUT, and `-` is no file; give OUTPUT a name";
+            let reason = "is written beside OUTPUT, but `-` is not a file; give a file as OUTPUT";
             return Err(Failure::usage(word.flag(), reason));
         }
         console::check_takes_data()?;
@@ -239,7 +227,7 @@ fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathB
     Ok(also)
 }
 
-/// Finds out whether the outputs can hold disparities of `range`.
+/// Checks that the outputs can store disparities of `range`.
 fn check_range(args: &Args, range: DisparityRange) -> Result<()> {
     let (output, range) = (args.output(), args.sign.range(range));
     if !files::is_printed(output) {
@@ -248,7 +236,7 @@ fn check_range(args: &Args, range: DisparityRange) -> Result<()> {
     Ok(args.also.wanted().try_for_each(|word| word.check(&word.beside(output), range))?)
 }
 
-/// Writes all outputs, or leaves none of them. Returns what there is to say of depths and points.
+/// Writes all outputs, or none. Returns remarks about depths and points.
 fn write_outputs(
     args: &Args,
     also: &[(&Also, PathBuf)],
@@ -265,7 +253,7 @@ fn write_outputs(
     for (word, path) in also {
         said.extend(written.note(path, args.also.write(word, path, outcome))?);
     }
-    // The same points may be written in several formats.
+    // The same points in several formats give the same remark.
     said.dedup();
     let json =
         args.json.as_deref().map(|path: &Path| Ok::<_, Failure>((path, files::json_text(path, record)?)));
@@ -273,7 +261,7 @@ fn write_outputs(
     if let Some((path, text)) = json.as_ref().filter(|(path, _)| !files::is_printed(path)) {
         written.note(path, write::save(path, text.as_bytes()))?;
     }
-    // What is printed cannot be taken back, so it comes last.
+    // Printing cannot be undone, so it comes last.
     if files::is_printed(output) {
         console::print_data(&pfm::encode(&map()), "map")?;
     }

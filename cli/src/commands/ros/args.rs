@@ -10,11 +10,11 @@ use crate::args::{CameraArgs, CropArgs, ExecutionArgs, MethodArgs, Rectification
 use crate::failure::{Failure, Result};
 use crate::outputs::AlsoArgs;
 
-/// The name of the node, unless it is given another one.
+/// The default name of the node.
 const NODE: &str = "mrfgs";
-/// The variable that names the domain.
+/// The environment variable of the domain.
 const DOMAIN: &str = "ROS_DOMAIN_ID";
-/// The variable that names the release of ROS, and those whose identifiers are longer.
+/// The environment variable of the ROS release, and the releases with longer identifiers.
 const RELEASE: &str = "ROS_DISTRO";
 const LONG: [&str; 3] = ["foxy", "galactic", "humble"];
 const EXAMPLES: &str = "\
@@ -27,45 +27,45 @@ Examples:
   # Cameras that are not triggered together:
   mrfgs ros --tolerance 0.005";
 
-/// Match what two cameras publish in ROS 2, live
+/// Match live images of two cameras in ROS 2
 ///
-/// A node of ROS 2 that takes no ROS: it speaks DDS, as ROS does by Cyclone DDS, Fast DDS and others. It subscribes to the images
-/// `left/image_raw` and `right/image_raw` and to the `camera_info` beside each, and publishes `disparity`
-/// (`stereo_msgs/msg/DisparityImage`) with the time and the frame of the left image. With --also depth, depth-mm, points, sigma, depth-sigma,
-/// confidence and validity it publishes these, too: on `depth/image_rect`, `depth/image_rect_raw`, `points2`, `sigma`, `depth/sigma`,
-/// `confidence` and `validity`, and depths with a `depth/camera_info`; with --also depth-registered and depth-registered-mm the depths that
-/// the camera of --into sees, on `depth_registered/image` and `depth_registered/image_raw`, with a `depth_registered/camera_info`.
+/// A ROS 2 node that needs no ROS installation: it speaks DDS, like Cyclone DDS and Fast DDS. It subscribes to `left/image_raw`,
+/// `right/image_raw` and the `camera_info` beside each, and publishes `disparity` (`stereo_msgs/msg/DisparityImage`) with the time and
+/// frame of the left image. --also adds topics: depth on `depth/image_rect`, depth-mm on `depth/image_rect_raw` (both with
+/// `depth/camera_info`), points on `points2`, sigma on `sigma`, depth-sigma on `depth/sigma`, confidence on `confidence`, validity on
+/// `validity`, and in the view of the camera of --into depth-registered on `depth_registered/image` and depth-registered-mm on
+/// `depth_registered/image_raw`, with `depth_registered/camera_info`.
 ///
-/// Images on topics such as `image_rect` are rectified; others are rectified by their `camera_info`. Topics that end in `/compressed`
-/// hold `CompressedImage`.
+/// Images on topics such as `image_rect` count as rectified; others are rectified with their `camera_info`. Topics that end in
+/// `/compressed` carry `CompressedImage`.
 ///
-/// A node that is slower than its cameras leaves out all pairs but the newest one. While nobody subscribes, nothing is matched. Every
-/// ten seconds it says how many frames it has matched, how long they took and what it left out. It ends with Ctrl-C or SIGTERM, and then
-/// its exit status is 0. What a camera sends that makes no sense is told and left out.
+/// If matching is slower than the cameras, only the newest pair is matched. Without subscribers nothing is matched. Every ten seconds a
+/// line tells how many frames were matched, how long they took and what was skipped. The node ends with Ctrl-C or SIGTERM, with exit status
+/// 0. Malformed messages are reported and skipped.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 #[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
 pub(crate) struct Args {
-    /// Gives a topic another name, as ROS does: `FROM:=TO`. `__ns:=/NAMESPACE` puts all topics below a namespace, and `__node:=NAME`
-    /// renames the node, below which topics are that begin with ~/
+    /// Renames a topic as in ROS: `FROM:=TO`. `__ns:=/NAMESPACE` puts all topics into a namespace, and `__node:=NAME` renames the node,
+    /// whose name prefixes topics that start with ~/
     #[arg(short, long, value_name = "FROM:=TO")]
     remap: Vec<Rule>,
-    /// What launch files of ROS begin their flags with
+    /// Launch files of ROS put this before their flags
     #[arg(long = "ros-args", hide = true)]
     _from_launch_file: bool,
-    /// The domain, 0 to 232: nodes of other domains are not seen [default: that of the variable `ROS_DOMAIN_ID`, or 0]
+    /// DDS domain, 0 to 232; nodes in other domains are invisible [default: `ROS_DOMAIN_ID`, or 0]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(..=i64::from(MOST_DOMAIN)))]
     domain: Option<u16>,
-    /// Has images that were lost sent again, by cameras that offer it. Else they are lost, as ROS has it for sensors
+    /// Requests lost images again, from cameras that support it. Otherwise they are skipped, as is usual for sensors in ROS
     #[arg(long)]
     pub(super) reliable: bool,
-    /// How far the times of two images may be apart that are a pair, in seconds: less than half of the time between two images of a
-    /// camera [default: 0]
+    /// Maximum difference in time between the two images of a pair, in seconds: less than half the time between two images of a camera
+    /// [default: 0]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = nanoseconds)]
     pub(super) tolerance: Option<u64>,
     #[command(flatten)]
     pub(super) search: Search,
-    /// Calibration, in the place of what the cameras say: as `mrfgs match` takes it
+    /// Calibration that replaces the cameras' own, as for `mrfgs match`
     #[arg(long, value_name = "FILE")]
     pub(super) calib: Vec<PathBuf>,
     #[command(flatten)]
@@ -74,11 +74,10 @@ pub(crate) struct Args {
     pub(super) numbers: CameraArgs,
     #[command(flatten)]
     pub(super) rectification: RectificationArgs,
-    /// Where the image does not change, the disparity follows that of the frames before, weighted by confidence: still surfaces flicker
-    /// less
+    /// Steadies still surfaces: where the image does not change, disparities are averaged with earlier frames, weighted by confidence
     #[arg(long)]
     pub(super) steady: bool,
-    /// Where matches in the frames show that the right camera has turned since the calibration, corrects the frames from then on
+    /// Corrects the frames if their matches show that the right camera has turned since the calibration
     #[arg(long)]
     pub(super) recalibrate: bool,
     #[command(flatten)]
@@ -94,12 +93,12 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// The names that the topics get.
+    /// The names of the node and its topics.
     pub(super) fn names(&self) -> Result<Names> {
         Names::new(NODE, &self.remap).map_err(|reason| Failure::usage("--remap", reason))
     }
 
-    /// The domain of DDS.
+    /// The DDS domain.
     pub(super) fn domain(&self) -> Result<u16> {
         if let Some(domain) = self.domain {
             return Ok(domain);
@@ -107,7 +106,8 @@ impl Args {
         match std::env::var(DOMAIN) {
             Ok(text) if !text.is_empty() => {
                 let domain = text.trim().parse().ok().filter(|domain| *domain <= MOST_DOMAIN);
-                let reason = format!("{} is no domain; give a number from 0 to {MOST_DOMAIN}", quoted(&text));
+                let reason =
+                    format!("{} is not a domain; give a number from 0 to {MOST_DOMAIN}", quoted(&text));
                 domain.ok_or_else(|| Failure::usage(DOMAIN, reason))
             }
             _ => Ok(0),
@@ -115,7 +115,7 @@ impl Args {
     }
 }
 
-/// The bytes of identifiers in the release of ROS whose set-up this shell has read, or in today's.
+/// The size of identifiers in bytes, for the ROS release of this shell, else for current releases.
 pub(super) fn gid_bytes() -> usize {
     let is_old = std::env::var(RELEASE).is_ok_and(|release| LONG.contains(&release.as_str()));
     if is_old { LONG_GID_BYTES } else { GID_BYTES }

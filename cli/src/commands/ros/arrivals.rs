@@ -1,4 +1,4 @@
-//! What the cameras publish: their topics, and what came of them.
+//! Subscriptions to the cameras, and the pairs that have arrived.
 
 use std::path::PathBuf;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -22,53 +22,53 @@ pub(super) fn of_network(reason: impl Into<Reason>) -> Failure {
 
 /// The topics of both cameras.
 #[derive(Clone)]
-pub(super) struct Cameras {
+pub(super) struct CameraTopics {
     images: [Topic; 2],
     infos: [String; 2],
 }
 
-/// A pair of images as it arrived.
+/// A pair of images that has arrived.
 pub(super) struct Arrived {
     pub(super) header: Header,
     /// The messages of both images.
     pub(super) images: [Vec<u8>; 2],
-    /// When the second one was there.
+    /// When the second image arrived.
     pub(super) at: Instant,
 }
 
-/// How much came so far.
+/// Counts since the start.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Count {
-    /// Images and calibrations of the left and of the right camera.
+    /// Images and calibrations of the left and the right camera.
     pub(super) images: [usize; 2],
     pub(super) infos: [usize; 2],
-    /// Messages that make no sense.
+    /// Malformed messages.
     pub(super) unreadable: usize,
-    /// Pairs that were left out for newer ones.
+    /// Pairs dropped for newer ones.
     pub(super) replaced: usize,
     pub(super) tally: Tally,
 }
 
 #[derive(Default)]
 struct State {
-    /// The newest pair that nobody has taken.
+    /// The newest pair that has not been taken.
     pair: Option<Arrived>,
     infos: [Option<CameraInfo>; 2],
     count: Count,
-    /// Why a message makes no sense, where that was not told.
+    /// Topic and reason of a malformed message that was not reported yet.
     unreadable: Option<(usize, Reason)>,
     /// The topics on which others publish messages of other types, and these types.
     mistyped: Vec<(usize, Vec<String>)>,
 }
 
-/// What arrives, between the thread that receives it and the one that matches.
+/// Data shared by the receiving thread and the matching thread.
 #[derive(Default)]
 pub(super) struct Arrivals {
     state: Mutex<State>,
     has_pair: Condvar,
 }
 
-impl Cameras {
+impl CameraTopics {
     pub(super) fn new(names: &Names) -> Result<Self> {
         let named = |reason| Failure::usage("--remap", reason);
         let image = |name: &str| {
@@ -79,10 +79,10 @@ impl Cameras {
         let images = [image("left/image_raw")?, image("right/image_raw")?];
         if images[0].name == images[1].name {
             return Err(named(
-                format!("both images are {}; give each a topic of its own", images[0].name).into(),
+                format!("both images are on {}; give each its own topic", images[0].name).into(),
             ));
         }
-        // Beside the image, unless that has another name by itself.
+        // The topic beside the image, unless it is remapped itself.
         let info = |name: &str, image: &Topic| {
             let beside = image.camera_infos().pop().filter(|_| !names.remaps(name));
             beside.map_or_else(|| names.resolve(name).map_err(named), Ok)
@@ -91,22 +91,22 @@ impl Cameras {
         Ok(Self { images, infos })
     }
 
-    /// The topic of the images of the left (0) or right (1) camera.
+    /// The image topic of the left (0) or right (1) camera.
     pub(super) fn image(&self, side: usize) -> &str {
         &self.images[side].name
     }
 
-    /// The type of its messages.
+    /// The message type of the image topic.
     pub(super) fn kind(&self, side: usize) -> &str {
         &self.images[side].kind
     }
 
-    /// The topic of its calibration.
+    /// The calibration topic.
     pub(super) fn info(&self, side: usize) -> &str {
         &self.infos[side]
     }
 
-    /// Whether the images are rectified, by the names of their topics.
+    /// Whether the images are rectified, according to the names of their topics.
     pub(super) fn are_rectified(&self) -> bool {
         self.images.iter().all(Topic::is_rectified)
     }
@@ -117,12 +117,12 @@ impl Cameras {
         if number < 2 { [self.image(side), self.kind(side)] } else { [self.info(side), CameraInfo::NAME] }
     }
 
-    /// What errors call an image of this time.
+    /// The name of an image with this time in errors.
     pub(super) fn named(&self, side: usize, stamp: Stamp) -> PathBuf {
         format!("{} at {stamp}", self.image(side)).into()
     }
 
-    /// Subscribes to the images, and then to the calibrations.
+    /// Subscribes to the images, then to the calibrations.
     pub(super) fn subscribe(&self, participant: &Participant, reliable: bool) -> Result<Subscriptions> {
         let mut all = Subscriptions::new().map_err(of_network)?;
         for topic in &self.images {
@@ -140,7 +140,7 @@ impl Arrivals {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes what comes until the user stops it or the network fails, and looks that often whether it is stopped.
+    /// Receives messages until the user stops the program or the network fails; checks for a stop every `patience`.
     pub(super) fn receive(
         &self,
         mut subscriptions: Subscriptions,
@@ -175,7 +175,7 @@ impl Arrivals {
     ) -> mrfgs_ros::messages::Result<()> {
         let header = Header::of(&bytes, Encoding::Cdr)?;
         if header.stamp.0 == 0 {
-            return Err("has no time in its header (it is 0), and images are paired by it".into());
+            return Err("has time 0 in its header, but images are paired by time".into());
         }
         let pair = pairing.add(side, header.stamp, (header, bytes));
         let mut state = self.state();
@@ -193,25 +193,25 @@ impl Arrivals {
         let info = CameraInfo::decode(bytes, Encoding::Cdr)?;
         let mut state = self.state();
         state.count.infos[side] += 1;
-        // The camera matters, not when it told of itself.
+        // Ignore the time, so that only changes of the camera count.
         state.infos[side] = Some(CameraInfo { header: Header::default(), ..info });
         Ok(())
     }
 
-    /// The newest pair; `None` where none comes in that time.
+    /// The newest pair; `None` if none arrives within `patience`.
     pub(super) fn next(&self, patience: Duration) -> Option<Arrived> {
         let state = self.state();
         let waited = self.has_pair.wait_timeout_while(state, patience, |state| state.pair.is_none());
         waited.unwrap_or_else(PoisonError::into_inner).0.pair.take()
     }
 
-    /// The last calibration of both cameras, where both have sent one.
+    /// The last calibration of both cameras, if both have sent one.
     pub(super) fn cameras(&self) -> Option<[CameraInfo; 2]> {
         let [left, right] = self.state().infos.clone();
         Some([left?, right?])
     }
 
-    /// How much came so far.
+    /// Counts since the start.
     pub(super) fn count(&self) -> Count {
         self.state().count
     }
@@ -221,7 +221,7 @@ impl Arrivals {
         self.state().mistyped.clone()
     }
 
-    /// Why a message of a topic made no sense, once.
+    /// Takes the topic and reason of the first malformed message since the last call.
     pub(super) fn unreadable(&self) -> Option<(usize, Reason)> {
         self.state().unreadable.take()
     }

@@ -1,4 +1,4 @@
-//! What a node says while it runs: how much it has matched, how long that took, and what it left out.
+//! Status lines of a running node: matched frames, their times, and skipped ones.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -7,27 +7,27 @@ use mrfgs_ros::messages::{CompressedImage, Image, Type};
 use crate::console;
 use crate::text::plural;
 
-use super::arrivals::{Arrivals, Arrived, Cameras, Count};
+use super::arrivals::{Arrivals, Arrived, CameraTopics, Count};
 
-/// How often it says so.
+/// Interval of the status line.
 const PERIOD: Duration = Duration::from_secs(10);
-/// Reasons that are told in that time.
+/// Maximum number of complaints per period.
 const MOST: usize = 4;
-/// A wait for calibrations that is told: cameras may send them after their first images.
+/// A longer wait for calibrations is reported; cameras may send them after their first images.
 const LONG: Duration = Duration::from_secs(2);
-/// Stamps that are further from now are of another clock: a recording that is played, or a simulation.
+/// Stamps further from now than this belong to another clock, that of a played recording or a simulation.
 const SAME_CLOCK: Duration = Duration::from_secs(60);
 
-/// What has happened to pairs since some time.
+/// Counts of pairs in a period.
 #[derive(Default)]
 struct Frames {
     /// From the arrival of the second image to the publication, in milliseconds.
     delays: Vec<f64>,
-    /// From the stamp of the left image to the publication, in milliseconds, where the clock is the same.
+    /// From the stamp of the left image to the publication, in milliseconds, if both clocks agree.
     ages: Vec<f64>,
     failed: usize,
     unheard: usize,
-    /// Without the calibration of both cameras.
+    /// Pairs without a calibration of both cameras.
     waiting: usize,
 }
 
@@ -36,12 +36,12 @@ pub(super) struct Log {
     start: Instant,
     period: Instant,
     frames: Frames,
-    /// What had arrived at the start of the period.
+    /// Counts at the start of the period.
     before: Count,
-    /// How many frames were published, and how many were not, before the period.
+    /// Published and failed frames before the period.
     published: usize,
     failed: usize,
-    /// What failed and was told in the period, without its numbers.
+    /// Complaints printed in this period, without digits.
     told: Vec<String>,
 }
 
@@ -52,7 +52,7 @@ impl Log {
         Self { quiet, start: now, period: now, frames, before, published: 0, failed: 0, told: Vec::new() }
     }
 
-    /// Counts a pair whose maps are published.
+    /// Counts a published pair.
     pub(super) fn published(&mut self, arrived: &Arrived) {
         let milliseconds = |time: Duration| 1e3 * time.as_secs_f64();
         self.frames.delays.push(milliseconds(arrived.at.elapsed()));
@@ -63,36 +63,36 @@ impl Log {
         }
     }
 
-    /// Counts a pair that nobody wants.
+    /// Counts a pair without subscribers.
     pub(super) fn unheard(&mut self) {
         self.frames.unheard += 1;
     }
 
-    /// Counts a pair that gave no maps, and says why now and then.
+    /// Counts a failed pair, and reports the reason.
     pub(super) fn failed(&mut self, reason: &str) {
         self.frames.failed += 1;
         self.complain(reason);
     }
 
-    /// Says now and then why a part of an image may be wrong.
+    /// Reports that part of an image may be damaged.
     pub(super) fn doubted(&mut self, doubt: &str) {
         if !self.quiet {
             self.complain(&format!("warning: {doubt}"));
         }
     }
 
-    /// Counts a pair whose cameras have not told their calibration, and says so where that lasts.
-    pub(super) fn waits(&mut self, cameras: &Cameras) {
+    /// Counts a pair without a calibration, and reports it if that lasts.
+    pub(super) fn waits(&mut self, cameras: &CameraTopics) {
         self.frames.waiting += 1;
         if self.start.elapsed() >= LONG {
             let [left, right] = [0, 1].map(|side| cameras.info(side));
             self.complain(&format!(
-                "there is no calibration of both cameras on {left} and {right}; give one with --calib"
+                "no calibration of both cameras arrives on {left} and {right}; give one with --calib"
             ));
         }
     }
 
-    /// Says a reason once in a period, whatever its numbers are, and not all if there are many.
+    /// Prints a complaint, once per period whatever its numbers, and at most [`MOST`].
     fn complain(&mut self, reason: &str) {
         let words = reason.replace(|c: char| c.is_ascii_digit(), "");
         if self.told.len() < MOST && !self.told.contains(&words) {
@@ -101,8 +101,8 @@ impl Log {
         }
     }
 
-    /// Says how it goes, where it is time.
-    pub(super) fn tell(&mut self, cameras: &Cameras, arrivals: &Arrivals) {
+    /// Prints the status line if it is due.
+    pub(super) fn tell(&mut self, cameras: &CameraTopics, arrivals: &Arrivals) {
         if let Some((topic, reason)) = arrivals.unreadable() {
             let [name, _] = cameras.topic(topic);
             self.complain(&format!("a message of {name} {reason}"));
@@ -126,7 +126,7 @@ impl Log {
         (self.before, self.period) = (count, Instant::now());
     }
 
-    /// Says what came of all.
+    /// Prints the totals.
     pub(super) fn end(&self, arrivals: &Arrivals) {
         if self.quiet {
             return;
@@ -154,8 +154,8 @@ fn mistyped(name: &str, expected: &str, found: &str) -> String {
     )
 }
 
-/// How it went in a period.
-fn line(cameras: &Cameras, frames: &Frames, before: &Count, count: &Count, passed: Duration) -> String {
+/// The status line of a period.
+fn line(cameras: &CameraTopics, frames: &Frames, before: &Count, count: &Count, passed: Duration) -> String {
     let published = frames.delays.len();
     let came = |side: usize| count.images[side] - before.images[side];
     let mut said = Vec::new();
@@ -171,7 +171,7 @@ fn line(cameras: &Cameras, frames: &Frames, before: &Count, count: &Count, passe
             said.push(format!("{median:.0} ms from the stamp, {most:.0} at most"));
         }
     } else if frames.unheard > 0 {
-        said.push(format!("nobody subscribes; {} pairs are not matched", frames.unheard));
+        said.push(format!("no subscribers; {} pairs are not matched", frames.unheard));
     } else if frames.waiting > 0 {
         said.push(format!("{} pairs without the calibration of both cameras", frames.waiting));
     } else if frames.failed == 0 {
@@ -187,7 +187,7 @@ fn line(cameras: &Cameras, frames: &Frames, before: &Count, count: &Count, passe
     said.join("; ")
 }
 
-/// What was left out between two counts.
+/// Texts about skipped images and pairs between two counts.
 fn left_out(before: &Count, count: &Count, failed: usize) -> Vec<String> {
     let since = |of: fn(&Count) -> usize| of(count) - of(before);
     let mut said = Vec::new();
@@ -196,17 +196,17 @@ fn left_out(before: &Count, count: &Count, failed: usize) -> Vec<String> {
             said.push(format!("{number} {what}"));
         }
     };
-    add(since(|count| count.replaced), "left out for newer ones");
+    add(since(|count| count.replaced), "skipped for newer ones");
     add(failed, "failed");
     add(since(|count| count.tally.alone[0]), "left images without a partner");
     add(since(|count| count.tally.alone[1]), "right images without a partner");
-    add(since(|count| count.tally.repeated), "images twice");
-    add(since(|count| count.tally.late), "images too late");
-    add(since(|count| count.unreadable), "messages that make no sense");
+    add(since(|count| count.tally.repeated), "repeated images");
+    add(since(|count| count.tally.late), "late images");
+    add(since(|count| count.unreadable), "malformed messages");
     said
 }
 
-/// The median and the largest.
+/// The median and the maximum.
 fn spread(times: &[f64]) -> (f64, f64) {
     let mut sorted = times.to_vec();
     sorted.sort_by(f64::total_cmp);

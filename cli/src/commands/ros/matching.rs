@@ -1,4 +1,4 @@
-//! What matches the pairs of a node, and what it takes for that: the range and the cameras, which are found anew when the cameras change.
+//! Matches the pairs of a node. Range and calibration are determined again when the cameras change.
 
 use std::path::{Path, PathBuf};
 
@@ -17,33 +17,33 @@ use mrfgs_ros::messages::{CameraInfo, Encoding, Header};
 use crate::args::Sign;
 use crate::failure::{Failure, Result};
 use crate::outputs::messages::{self, Messages, Sink};
-use crate::outputs::{Cameras as Maps, Outcome};
+use crate::outputs::{Cameras, Outcome};
 use crate::pairs::input::{Calib, Input};
 use crate::sequences::{Rectifier, ros};
 use crate::{console, remedy, stop};
 
 use super::args::Args;
-use super::arrivals::{Arrived, Cameras};
+use super::arrivals::{Arrived, CameraTopics};
 use super::log::Log;
 use super::publications::Publications;
 
-/// Matches pairs and publishes what it finds.
+/// Matches pairs and publishes the results.
 pub(super) struct Matching<'a> {
     args: &'a Args,
-    cameras: Cameras,
+    cameras: CameraTopics,
     matcher: Matcher,
     sigma: Sigma,
     /// The camera of `--into`.
     third: Option<ThirdCamera>,
     /// `None` before the first pair.
-    known: Option<Known>,
-    /// Whether it was told that the match runs elsewhere than asked for.
+    known: Option<RigState>,
+    /// Whether a change of device has been reported.
     noted: bool,
 }
 
-/// What is known of the cameras and of what they see.
-struct Known {
-    /// What it follows from: the size of the images, and what the cameras say.
+/// Everything derived from the cameras and the first pair.
+struct RigState {
+    /// The image size and the calibration messages that this was derived from.
     size: (usize, usize),
     infos: Option<[CameraInfo; 2]>,
     range: DisparityRange,
@@ -54,7 +54,7 @@ struct Known {
 }
 
 impl<'a> Matching<'a> {
-    pub(super) fn new(args: &'a Args, cameras: Cameras, execution: Execution) -> Result<Self> {
+    pub(super) fn new(args: &'a Args, cameras: CameraTopics, execution: Execution) -> Result<Self> {
         let third = args.also.third()?;
         let method = args.also.made_by(args.method.method()?)?;
         let sigma = Sigma::for_method(&method);
@@ -65,10 +65,10 @@ impl<'a> Matching<'a> {
         Ok(Self { args, cameras, matcher, sigma, third, known: None, noted: false })
     }
 
-    /// Matches a pair whose cameras say this, and publishes what it finds. What makes no sense is told by the log.
+    /// Matches a pair and publishes the results; `infos` are the cameras' calibrations. Errors of single pairs go to the log.
     ///
     /// # Errors
-    /// Where nothing that follows can be matched either.
+    /// Only errors that would also affect all later pairs.
     pub(super) fn publish(
         &mut self,
         arrived: Arrived,
@@ -103,7 +103,7 @@ impl<'a> Matching<'a> {
     ) -> Result<[Option<String>; 2]> {
         let header = &arrived.header;
         let pair = self.pair(arrived)?;
-        let is_known = |known: &Known| known.size == pair.size() && known.infos == infos;
+        let is_known = |known: &RigState| known.size == pair.size() && known.infos == infos;
         if !self.known.as_ref().is_some_and(is_known) {
             self.known = None;
             self.known = Some(self.begin(pair.clone(), infos)?);
@@ -141,7 +141,7 @@ impl<'a> Matching<'a> {
         Ok(pair.doubts().clone())
     }
 
-    /// The images of a pair.
+    /// Decodes the images of a pair.
     fn pair(&self, Arrived { header, images: [left, right], .. }: &Arrived) -> Result<Pair> {
         let view = |side: usize, bytes: &[u8]| {
             let stamp = Header::of(bytes, Encoding::Cdr).map_or(header.stamp, |header| header.stamp);
@@ -153,8 +153,8 @@ impl<'a> Matching<'a> {
         Ok(if rectified { Pair::of_frames(left?, right?)? } else { Pair::of_raw_frames(left?, right?)? })
     }
 
-    /// What follows from the first pair of cameras that say this.
-    fn begin(&mut self, pair: Pair, infos: Option<[CameraInfo; 2]>) -> Result<Known> {
+    /// Determines range and calibration from the first pair of these cameras.
+    fn begin(&mut self, pair: Pair, infos: Option<[CameraInfo; 2]>) -> Result<RigState> {
         let args = self.args;
         let size = pair.size();
         let texts = self.texts(infos.as_ref())?;
@@ -178,24 +178,24 @@ impl<'a> Matching<'a> {
             word.check_metres(rig)?;
         }
         let range = self.range(&input)?;
-        let cameras = input.calibration().and_then(|calibration| Maps::of(calibration, (0, 0)));
+        let cameras = input.calibration().and_then(|calibration| Cameras::of(calibration, (0, 0)));
         let known = input.calibration().and_then(|known| Rectification::of_rectified(known, size).ok());
         let rectifier = Rectifier::new(input.rectification, known, range, args.recalibrate);
         let (messages, steady) = (
             Messages::new(range, cameras, args.also.framed(self.third.as_ref())),
             args.steady.then(Steady::new),
         );
-        Ok(Known { size, infos, range, rectifier, rig, messages, steady })
+        Ok(RigState { size, infos, range, rectifier, rig, messages, steady })
     }
 
-    /// What the cameras say in the words of files, unless the user says it.
+    /// The cameras' own calibrations as texts of files; `None` if the user gives the cameras.
     fn texts(&self, infos: Option<&[CameraInfo; 2]>) -> Result<Option<Vec<(PathBuf, String)>>> {
         let Self { args, cameras, .. } = self;
         let Some([l, r]) = infos.filter(|_| !args.gives_cameras()) else { return Ok(None) };
         if ros::are_exchanged([l, r]) {
             let (left, right) = (cameras.image(0), cameras.image(1));
             let reason = format!(
-                "by its calibration {left} is the right camera; remap left/image_raw to {right}, and the other way round"
+                "according to its calibration {left} is the right camera; remap left/image_raw to {right} and right/image_raw to {left}"
             );
             return Err(Failure::Failed(reason));
         }
@@ -204,7 +204,7 @@ impl<'a> Matching<'a> {
         Ok(Some(vec![text(cameras.info(0), l), text(cameras.info(1), r)]))
     }
 
-    /// The range of all frames: where sparse matches found it, a match of this frame shows whether that is enough.
+    /// The range for all frames. If it was estimated, a match of this frame shows whether it must be wider.
     fn range(&mut self, input: &Input) -> Result<DisparityRange> {
         let searched = input.searched(|_| true);
         if !searched.may_widen {
@@ -219,13 +219,13 @@ impl<'a> Matching<'a> {
 }
 
 impl Args {
-    /// Whether the user says the cameras.
+    /// Whether the user gives the cameras.
     fn gives_cameras(&self) -> bool {
         !self.calib.is_empty() || self.numbers.flag().is_some()
     }
 
-    /// Whether images come rectified: by the names of their topics, or since the user gives the numbers of rectified ones.
-    fn are_rectified(&self, cameras: &Cameras) -> bool {
+    /// Whether images are rectified, according to their topic names or because --focal describes a rectified pair.
+    fn are_rectified(&self, cameras: &CameraTopics) -> bool {
         cameras.are_rectified() || self.numbers.flag().is_some()
     }
 }

@@ -17,19 +17,19 @@ use crate::{console, stop};
 
 pub(crate) use args::Args;
 use args::gid_bytes;
-use arrivals::{Arrivals, Cameras, of_network};
+use arrivals::{Arrivals, CameraTopics, of_network};
 use log::Log;
 use matching::Matching;
 use publications::Publications;
 
-/// How often a wait for a pair looks whether the user has stopped it.
+/// Interval at which a wait for a pair checks for a stop.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let execution = args.execution.execution();
-    args.also.check_messages("leave it out")?;
+    args.also.check_messages("remove it")?;
     let (names, domain) = (args.names()?, args.domain()?);
-    let cameras = Cameras::new(&names)?;
+    let cameras = CameraTopics::new(&names)?;
     let mut matching = Matching::new(args, cameras.clone(), execution)?;
     stop::listen();
     let participant = Participant::new(domain).map_err(of_network)?;
@@ -41,7 +41,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let _announcement = announced.map_err(of_network)?;
     if !args.quiet {
         console::say(&format!(
-            "{} takes {} and {}, and publishes {}; domain {domain}",
+            "{} subscribes to {} and {} and publishes {}; domain {domain}",
             names.node(),
             cameras.image(0),
             cameras.image(1),
@@ -68,7 +68,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     log.end(&arrivals);
     match receiving.is_finished().then(|| receiving.join()) {
         Some(Ok(ended)) => ended.map_err(of_network),
-        Some(Err(_)) => Err(Failure::Failed("what receives images failed".into())),
+        Some(Err(_)) => Err(Failure::Failed("the image receiver failed".into())),
         None => Ok(()),
     }
 }

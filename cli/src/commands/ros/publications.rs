@@ -11,16 +11,16 @@ use crate::outputs::messages::{self, Sink, Topic};
 
 use super::arrivals::of_network;
 
-/// The topics of disparities and of what is wanted beside them.
+/// The disparity topic and the topics of the selected outputs.
 pub(super) struct Publications(Vec<(Topic, String, Publication)>);
 
 impl Publications {
-    /// On topics that are called by these `names`.
+    /// Creates the publications; `names` resolves their topics.
     pub(super) fn new(participant: &Participant, names: &Names, also: &AlsoArgs) -> failure::Result<Self> {
         let mut topics = vec![messages::DISPARITY];
         topics.extend(also.topics());
         let mut cameras: Vec<_> = topics.iter().copied().filter_map(messages::camera_of).collect();
-        // One for depths in both units.
+        // Both units of depth share one camera topic.
         cameras.dedup();
         topics.extend(cameras);
         let published = topics.into_iter().map(|topic| {
@@ -31,30 +31,30 @@ impl Publications {
         published.collect::<failure::Result<_>>().map(Self)
     }
 
-    /// Their full names.
+    /// The full names of the topics.
     pub(super) fn names(&self) -> Vec<&str> {
         self.0.iter().map(|(_, name, _)| name.as_str()).collect()
     }
 
-    /// Each of them, in no order.
+    /// All publications, in no particular order.
     pub(super) fn iter(&self) -> impl Iterator<Item = &Publication> {
         self.0.iter().map(|(.., publication)| publication)
     }
 
-    /// Whether anybody listens to any of them. It takes in who has come and gone, so ask often.
+    /// Whether any topic has a subscriber. The call processes arrivals and departures, so call it often.
     pub(super) fn have_listeners(&mut self) -> bool {
-        // All are asked.
+        // Ask every publication, without short-circuiting.
         self.0.iter_mut().fold(false, |any, (.., publication)| publication.has_listeners() || any)
     }
 
-    /// Whether depths are among them, which come with their camera.
+    /// Whether depths are published, which come with a camera.
     pub(super) fn have_depth_camera(&self) -> bool {
         self.0.iter().any(|(topic, ..)| *topic == messages::DEPTH_CAMERA)
     }
 }
 
 impl Sink for Publications {
-    /// Only what somebody listens to is laid out and sent.
+    /// Encodes and sends a message only if its topic has a subscriber.
     fn put(&mut self, topic: Topic, _: &Header, message: &impl Encode) -> Result<()> {
         let Some((_, name, publication)) = self.0.iter_mut().find(|(known, ..)| *known == topic) else {
             return Ok(());

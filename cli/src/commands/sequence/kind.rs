@@ -1,14 +1,14 @@
-//! What an output is, by its name.
+//! The kind of an output, by its name.
 
 use std::path::Path;
 
 use crate::ffmpeg;
 use crate::outputs::is_printed;
 
-/// How the address of a viewer begins.
+/// The prefix of a viewer's address.
 const WEB_SOCKET: &str = "ws://";
 
-/// What an output is.
+/// The kind of an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Folder,
@@ -32,12 +32,12 @@ impl Kind {
         }
     }
 
-    /// Whether it takes the messages of ROS.
+    /// Whether it receives ROS messages.
     pub(super) fn takes_messages(self) -> bool {
         matches!(self, Self::Recording | Self::Viewer)
     }
 
-    /// What it is called.
+    /// Its name for messages.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Folder => "a folder",
@@ -48,7 +48,7 @@ impl Kind {
     }
 }
 
-/// Where viewers connect to an output: a host and a port.
+/// The address (host and port) of a viewer's output.
 pub(super) fn address(output: &Path) -> Option<&str> {
     output.to_str()?.strip_prefix(WEB_SOCKET).map(|address| address.trim_end_matches('/'))
 }

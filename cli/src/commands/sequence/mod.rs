@@ -25,7 +25,7 @@ use crate::outputs::messages::Messages;
 use crate::outputs::{Cameras, Files, MapArgs, files, is_printed};
 use crate::pairs::folder::CALIBRATION;
 use crate::pairs::input::{Calib, Input};
-use crate::sequences::{Frame, Frames, Layout, Pairing, RawFrames, Recorded, Rectifier, raw_frames};
+use crate::sequences::{FramePair, Frames, Layout, Pairing, RawFrames, Recorded, Rectifier, raw_frames};
 use crate::{console, ffmpeg, plan, stop};
 
 use kind::Kind;
@@ -37,41 +37,38 @@ Examples:
   mrfgs sequence left right maps --max-disparity 127
   mrfgs sequence 'cam/*_L.png' 'cam/*_R.png' maps --method fast
   mrfgs sequence left.mp4 right.mp4 disparity.mp4 --method fast
-  # Frames with both views, to a film:
+  # Frames with both views, as a film:
   mrfgs sequence pairs depth.y4m --layout top-bottom --colours viridis
-  # What ffmpeg -pix_fmt yuv444p -f yuv4mpegpipe sends, matched and played:
+  # A stream from ffmpeg -pix_fmt yuv444p -f yuv4mpegpipe, matched and played:
   mrfgs sequence - - --method fast --max-disparity 63 | ffplay -
-  # A recording of ROS, with the calibration in it:
+  # A ROS recording that contains the calibration:
   mrfgs sequence drive.mcap maps --also depth-mm
   mrfgs sequence drive.mcap found.mcap --also depth,points
-  # The same to look at, in Foxglove:
+  # Shown live in Foxglove:
   mrfgs sequence drive.mcap ws://localhost:8765 --also depth,points
-  # Raw images and a calibration, to depth in millimetres:
+  # Raw images and a calibration, with depth in millimetres:
   mrfgs sequence left right maps --rectify --calib c.yml --also depth-mm";
 
 /// Match the frames of a video
 ///
-/// LEFT and RIGHT are each a folder of images, a pattern of their names ('left/*.png', left/%04d.png), a film (MP4, Matroska,
-/// AVI) where ffmpeg is installed, a stream in YUV4MPEG2 as ffmpeg writes it (-f yuv4mpegpipe), or - for a stream on standard
-/// input. Images come in the order of their numbers, and those of the two cameras
-/// that have the same number are a pair (--pairing). Without RIGHT each frame holds both views, as --layout says. All frames have
-/// one size.
+/// LEFT and RIGHT are each a folder of images, a file name pattern ('left/*.png', left/%04d.png), a film (MP4, Matroska, AVI; needs
+/// ffmpeg), a YUV4MPEG2 stream (ffmpeg's -f yuv4mpegpipe), or - for a stream on standard input. Images are ordered by the numbers in their
+/// names, and images of the two cameras with the same number form a pair (--pairing). Without RIGHT each frame holds both views (--layout).
+/// All frames must have the same size.
 ///
-/// LEFT alone may also be a recording of ROS: an MCAP file, the folder of a bag of ROS 2 or a .db3 of one, or a .bag of ROS 1. Its
-/// images are paired by the times in their headers, and frames are called by these. Images on topics such as `image_rect` are rectified, others are
-/// rectified by the `camera_info` beside them.
+/// LEFT alone may also be a ROS recording: an MCAP file, the folder or .db3 of a ROS 2 bag, or a .bag of ROS 1. Its images are paired by
+/// the times in their headers, which also name the frames. Images on topics such as `image_rect` count as rectified; others are rectified
+/// with the `camera_info` beside them.
 ///
-/// OUTPUT is a folder, or a film: NAME.y4m, - for such a film on standard output, and where ffmpeg is installed NAME.mp4, .mkv,
-/// .mov, .webm or .avi. A folder gets a map of each frame, named after
-/// the left image (streams: 000000 and so on), and what --also asks for. A film shows the maps in colours, with a scale;
-/// with --also side-by-side, LEFT stands beside it. NAME.mcap is a recording of ROS 2: disparities on /disparity, and with --also
-/// depth, depth-mm, depth-registered, points, confidence or validity these, with the times of the left images. `ws://HOST:PORT` shows
-/// the same to Foxglove while frames are matched; a viewer that is slow gets the newest.
+/// OUTPUT is a folder, a film (NAME.y4m, - for Y4M on standard output, and with ffmpeg NAME.mp4, .mkv, .mov, .webm or .avi), a ROS 2
+/// recording (NAME.mcap) or an address for Foxglove (`ws://HOST:PORT`). A folder gets a map per frame, named after the left image (streams:
+/// 000000 and so on), and the --also outputs. A film shows the maps in colours with a colour bar; with --also side-by-side, LEFT is beside
+/// them. A recording has disparities on /disparity, and with --also depth, depth-mm, depth-registered, points, confidence or validity those
+/// too, with the times of the left images. Foxglove shows the same messages while frames are matched; a slow viewer gets the newest.
 ///
-/// Without --max-disparity the range is that of the calibration, or that of the first frame. While frames are matched, the next ones are
-/// read and rectified, and the last one is written. The CPU path matches as many at once as it has threads, as
-/// far as --memory allows. If an error or Ctrl-C ends a sequence early, the maps of
-/// all frames before are complete.
+/// Without --max-disparity the range is that of the calibration, or estimated from the first frame. Reading, rectifying, matching and
+/// writing run at the same time; the CPU path matches as many frames at once as it has threads and --memory allows. After an error or
+/// Ctrl-C, the maps of all earlier frames are complete.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_missing_positional = true)]
 #[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
@@ -80,19 +77,17 @@ pub(crate) struct Args {
     left: PathBuf,
     /// Frames of the right camera
     right: Option<PathBuf>,
-    /// Folder for the maps, film to write: NAME.y4m, NAME.mp4 or -, recording to write: NAME.mcap, or where Foxglove looks:
-    /// `ws://localhost:8765`
+    /// Folder for the maps, film (NAME.y4m, NAME.mp4 or -), recording (NAME.mcap), or address for Foxglove (`ws://localhost:8765`)
     #[arg(required = true)]
     output: PathBuf,
 
-    /// Which images of LEFT and RIGHT are a pair [default: number]
+    /// How images of LEFT and RIGHT are paired [default: number]
     #[arg(long, value_enum, value_name = "WHICH")]
     pairing: Option<Pairing>,
-    /// How both views share a frame, if RIGHT is not given [default: side-by-side]
+    /// How both views share a frame, without RIGHT [default: side-by-side]
     #[arg(long, value_enum, value_name = "WHICH")]
     layout: Option<Layout>,
-    /// Size and format of raw streams (ffmpeg: -f rawvideo), such as 1280x480,gray; formats are gray,
-    /// gray16le, rgb24 and bgr24
+    /// Size and format of a raw stream (ffmpeg: -f rawvideo), such as 1280x480,gray; formats are gray, gray16le, rgb24 and bgr24
     #[arg(long, value_name = "SIZE,FORMAT", value_parser = raw_frames)]
     raw_frames: Option<RawFrames>,
     #[command(flatten)]
@@ -101,35 +96,34 @@ pub(crate) struct Args {
     search: Search,
     #[command(flatten)]
     region: RegionArgs,
-    /// Calibration: the range (ndisp of a calib.txt), and the cameras for depth and points; as `mrfgs match` takes it
-    /// [default: a calib.txt beside the left images, or what a recording says]
+    /// Calibration, for the range (ndisp of a calib.txt) and for depth and points, as for `mrfgs match` [default: a calib.txt beside the
+    /// left images, or that of the recording]
     #[arg(long, value_name = "FILE")]
     calib: Vec<PathBuf>,
     #[command(flatten)]
     crop: CropArgs,
     #[command(flatten)]
     numbers: CameraArgs,
-    /// Image of the size of a left frame: where it is not black, LEFT is ignored in all frames
+    /// Mask of the size of a left frame: pixels that are not black are ignored in all frames
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
-    /// Frames are raw images: rectifies them by --calib first
+    /// Rectifies raw frames first, with --calib
     #[arg(long, requires = "calib")]
     rectify: bool,
     #[command(flatten)]
     rectification: RectificationArgs,
-    /// Where the image does not change, the disparity follows that of the frames before, weighted by confidence: still surfaces flicker
-    /// less. Confidence, validity, raw and the map of the right view stay those of the frame alone
+    /// Steadies still surfaces: where the image does not change, disparities are averaged with earlier frames, weighted by confidence.
+    /// Confidence, validity, raw and the right view's map are not averaged
     #[arg(long)]
     steady: bool,
-    /// Where matches in the frames show that the right camera has turned since the calibration, corrects the frames from then on.
-    /// Without it that is told
+    /// Corrects the frames if their matches show that the right camera has turned since the calibration. Without it, you are only told
     #[arg(long)]
     recalibrate: bool,
     #[command(flatten)]
     maps: MapArgs,
-    /// Writes a line of JSON for each frame: its `frame` (name), and the fields of `match --json`, where `seconds` count from
-    /// the first frame on; and `turned`, how far the right camera looks up, to the right and clockwise since the calibration, in degrees,
-    /// where the cameras are known. `-` prints them
+    /// Writes a line of JSON per frame: `frame` (its name), the fields of `match --json` with `seconds` since the first frame, and with
+    /// known cameras `turned`, how far the right camera has turned up, right and clockwise since the calibration, in degrees. `-` prints
+    /// them
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Checks everything up to the first frame and prints its plan (levels, schedule, memory), but matches and writes nothing
@@ -161,7 +155,7 @@ impl Args {
     }
 }
 
-/// What films are called that are not written here.
+/// Extensions of films that are not supported as output.
 const OTHER_FILMS: [&str; 4] = ["mpg", "mpeg", "wmv", "gif"];
 
 pub(crate) fn run(args: &Args) -> Result<()> {
@@ -171,12 +165,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if kind == Kind::Film {
         args.maps.also.check_film()?;
     } else if kind.takes_messages() {
-        args.maps.also.check_messages("give the name of a folder as OUTPUT")?;
+        args.maps.also.check_messages("give a folder as OUTPUT")?;
     }
     stop::listen();
     let recorded = open_recording(args)?;
     let texts = recorded.as_ref().map(|recorded| calibration_of(recorded, args)).transpose()?.flatten();
-    // What a recording has not rectified is rectified by what it says of its cameras.
+    // Unrectified images of a recording are rectified by the calibration in it.
     let rectify = args.rectify || texts.is_some() && recorded.as_ref().is_some_and(|one| !one.is_rectified());
     if kind == Kind::Folder {
         args.maps.also.check(rectify)?;
@@ -196,9 +190,10 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     check_outputs(args, &frames, first_image.as_deref())?;
     let rate = frames.rate();
     let films: Vec<_> = frames.films().map(|(film, complaint)| (film.to_owned(), complaint)).collect();
-    // The first frame decides on the range and, for all that follow, on the size.
+    // The first frame determines the range, and the size that all later frames must have.
     let (first, frames) = pipeline::patiently(move || (frames.next(), frames))?;
-    let Frame { name, header, pair } = first.ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
+    let FramePair { name, header, pair } =
+        first.ok_or_else(|| Error::read(&args.left, "contains no frame"))??;
     let sign = Sign::default();
     let cameras = args.maps.also.take_cameras();
     let beside = first_image
@@ -211,13 +206,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         by.keep_places()?;
     }
     if args.recalibrate && input.calibration().is_none() {
-        let reason = "takes the cameras; give them with --calib, or --focal and --baseline, or leave it out";
+        let reason = "needs camera values; add --calib, or --focal and --baseline, or remove it";
         return Err(Failure::usage("--recalibrate", reason));
     }
     if !args.quiet {
         input.say_range(sign, " in the first frame");
     }
-    // Messages also hold the cameras themselves, for which nothing needs to be asked; nor for what shows how one of them turns.
+    // Messages with cameras and --recalibrate use a calibration if there is one, but do not require all of it.
     let mut rig = if cameras.is_none() && (kind.takes_messages() || args.recalibrate) {
         None
     } else {
@@ -270,13 +265,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let pipeline = Pipeline { matcher, range, region, files, rectified, recalibrate, quiet: args.quiet };
     let known = input.calibration().and_then(|known| Rectification::of_rectified(known, size).ok());
     let rectifier = Rectifier::new(input.rectification, known, range, recalibrate);
-    let first = Frame { name, header, pair: input.pair };
+    let first = FramePair { name, header, pair: input.pair };
     let ended = pipeline.run(first, frames, rectifier, &mut sink);
     if !args.quiet {
         for (film, complaint) in &films {
             if let Some(said) = complaint.said() {
                 console::say(&format!(
-                    "warning: {}: some frames may be wrong, since ffmpeg says: {said}",
+                    "warning: {}: some frames may be damaged; ffmpeg says: {said}",
                     film.display()
                 ));
             }
@@ -288,7 +283,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     ended
 }
 
-/// The recording that LEFT is, if it is one.
+/// Opens LEFT if it is a recording.
 fn open_recording(args: &Args) -> Result<Option<Recorded>> {
     let (left, reader) = (args.left.clone(), args.reading.reader());
     let Args { recording, .. } = args;
@@ -298,12 +293,12 @@ fn open_recording(args: &Args) -> Result<Option<Recorded>> {
             [("--topics", recording.topics.is_some()), ("--tolerance", recording.tolerance.is_some())];
         return match flags.into_iter().find(|(_, given)| *given) {
             Some((flag, _)) => {
-                Err(Failure::usage(flag, "is for a recording, and LEFT is none; leave it out"))
+                Err(Failure::usage(flag, "only applies to a recording, but LEFT is not one; remove it"))
             }
             None => Ok(None),
         };
     }
-    let reason = "a recording holds both views, on two topics; leave it out";
+    let reason = "does not apply to a recording, which contains both views; remove it";
     for (flag, given) in [
         ("RIGHT", args.right.is_some()),
         ("--layout", args.layout.is_some()),
@@ -319,7 +314,7 @@ fn open_recording(args: &Args) -> Result<Option<Recorded>> {
     Ok(Some(opened))
 }
 
-/// The calibration that a recording has, where the user gives none.
+/// The recorded calibration, unless the user gives one or it is not needed.
 fn calibration_of(recorded: &Recorded, args: &Args) -> Result<Option<Vec<(PathBuf, String)>>> {
     if !args.calib.is_empty() || args.numbers.flag().is_some() {
         return Ok(None);
@@ -327,7 +322,7 @@ fn calibration_of(recorded: &Recorded, args: &Args) -> Result<Option<Vec<(PathBu
     let found = recorded.calibration()?;
     let (topic, beside) = recorded.left_topic();
     if found.is_some() {
-        // Rectified images need no cameras for their disparities, whatever is wrong with these.
+        // Disparities of rectified images need no cameras, so faults in the calibration do not matter then.
         let takes_cameras = takes_cameras(args) || args.search.takes_cameras().is_some();
         let counts = !recorded.is_rectified() || takes_cameras || Kind::of(&args.output).takes_messages();
         return Ok(found.filter(|_| counts));
@@ -335,21 +330,21 @@ fn calibration_of(recorded: &Recorded, args: &Args) -> Result<Option<Vec<(PathBu
     let path = recorded.path().display();
     if let Some(word) = args.maps.also.take_cameras() {
         let reason = format!(
-            "takes the cameras, and {path} has no calibration of both on topics such as {beside}; give one with --calib, or --focal and \
+            "needs camera values, but {path} lacks a calibration of both cameras (on topics such as {beside}); add --calib, or --focal and \
              --baseline"
         );
         return Err(Failure::usage(word.flag(), reason));
     }
     if recorded.is_raw() {
         let reason = format!(
-            "{topic} is not rectified, and there is no calibration of both cameras on topics such as {beside}; give --rectify and both \
-             files with --calib, or if it is rectified, --calib or --focal and --baseline"
+            "{topic} is not rectified, and there is no calibration of both cameras on topics such as {beside}; add --rectify and both \
+             files with --calib, or if it is in fact rectified, --calib or --focal and --baseline"
         );
         return Err(Error::read(recorded.path(), reason).into());
     }
     if !recorded.is_rectified() && !args.quiet {
         console::say(&format!(
-            "{topic} counts as rectified, since there is no calibration of both cameras on topics such as {beside}"
+            "{topic} is assumed to be rectified, as there is no calibration of both cameras on topics such as {beside}"
         ));
     }
     Ok(None)
@@ -360,9 +355,9 @@ fn takes_cameras(args: &Args) -> bool {
     args.maps.also.take_cameras().is_some() || args.recalibrate
 }
 
-/// The range for all frames: where sparse matches found it, a match of the first frame shows whether that is enough.
+/// The range for all frames. If it was estimated, a match of the first frame shows whether it must be wider.
 fn range_of_all(matcher: &mut Matcher, first: &Input, args: &Args) -> Result<DisparityRange> {
-    // The folder is not there yet, and does not matter.
+    // The folder may not exist yet; only the format matters here.
     let searched = first.searched(|wider| args.maps.check(Path::new(""), "000000", wider).is_ok());
     if !searched.may_widen {
         return Ok(first.range);
@@ -375,16 +370,16 @@ fn range_of_all(matcher: &mut Matcher, first: &Input, args: &Args) -> Result<Dis
     Ok(matched.range())
 }
 
-/// Refuses what would mean nothing, and the name of a film that is not written.
+/// Refuses flags without effect and unsupported film formats.
 fn check_flags(args: &Args) -> Result<()> {
     if args.layout.is_some() && args.right.is_some() {
-        let reason = "says how both views share a frame, and RIGHT is given; leave out one of them";
+        let reason = "only applies to frames with both views, but RIGHT is given; remove one of them";
         return Err(Failure::usage("--layout", reason));
     }
     let kind = Kind::of(&args.output);
     if args.maps.format.is_some() && kind != Kind::Folder {
         let reason = format!(
-            "is that of maps in a folder, and OUTPUT is {}; leave it out, or give the name of a folder as OUTPUT",
+            "only applies to maps in a folder, but OUTPUT is {}; remove it, or give a folder as OUTPUT",
             kind.name()
         );
         return Err(Failure::usage("--format", reason));
@@ -392,7 +387,7 @@ fn check_flags(args: &Args) -> Result<()> {
     let extension = args.output.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     if OTHER_FILMS.contains(&extension.as_str()) && !args.output.is_dir() {
         let reason = format!(
-            "films are NAME.y4m or NAME.mp4 here; ffmpeg makes a .{extension} of what goes to -: mrfgs sequence ... - | ffmpeg -i - {}",
+            ".{extension} is not supported; use NAME.mp4 or NAME.y4m, or pipe through ffmpeg: mrfgs sequence ... - | ffmpeg -i - {}",
             args.output.display()
         );
         return Err(Failure::usage("OUTPUT", reason));
@@ -400,12 +395,12 @@ fn check_flags(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// The frames that the arguments name.
+/// Opens the frames that the arguments name.
 fn open(args: &Args) -> Result<Frames> {
     let (left, right) = (args.left.as_path(), args.right.as_deref());
     if is_printed(left) && right.is_some_and(is_printed) {
-        let reason = "standard input holds one stream; give the frames of one camera another way, or both views \
-                      in one stream";
+        let reason = "standard input carries one stream; read one camera from elsewhere, or put both views \
+                      into one stream";
         return Err(Failure::usage("RIGHT", reason));
     }
     let (left, right) = (left.to_owned(), right.map(Path::to_owned));
@@ -420,19 +415,16 @@ fn open(args: &Args) -> Result<Frames> {
     if args.pairing.is_some() && !frames.are_images_of_two() {
         return Err(Failure::usage(
             "--pairing",
-            "is for the images of two cameras, LEFT and RIGHT; leave it out",
+            "only applies to image files of two cameras, LEFT and RIGHT; remove it",
         ));
     }
     if args.raw_frames.is_some() && !frames.have_stream() {
-        return Err(Failure::usage(
-            "--raw-frames",
-            "is for streams, and images say what they hold; leave it out",
-        ));
+        return Err(Failure::usage("--raw-frames", "only applies to streams without a header; remove it"));
     }
     Ok(frames)
 }
 
-/// The frames, with the mask that the user gives.
+/// Applies the mask of `--mask`, if given.
 fn masked(frames: Frames, args: &Args) -> Result<Frames> {
     match &args.mask {
         Some(mask) => Ok(frames.masked_by(args.reading.reader().mask(mask)?)),
@@ -440,7 +432,7 @@ fn masked(frames: Frames, args: &Args) -> Result<Frames> {
     }
 }
 
-/// Refuses outputs that are an input, a terminal, or a file where it must be a folder.
+/// Refuses outputs that overwrite an input, go to a terminal, or are of the wrong kind.
 fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Result<()> {
     let output = args.output.as_path();
     let mut inputs = frames.files();
@@ -454,7 +446,7 @@ fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Re
     }
     if is_printed(output) {
         if args.json.as_deref().is_some_and(is_printed) {
-            return Err(Failure::usage("--json", "`-` is the film already; give the name of a file"));
+            return Err(Failure::usage("--json", "`-` is already used for the film; give a file name"));
         }
         return Ok(console::check_takes_data()?);
     }
@@ -477,7 +469,7 @@ fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Re
     let inside = |file: &&Path| file.canonicalize().is_ok_and(|file| file.parent() == Some(&place));
     match inputs.iter().find(|file| inside(file)) {
         Some(_) => {
-            let reason = Reason::of_request("holds frames that are read; give another folder");
+            let reason = Reason::of_request("contains input frames; give another folder");
             Err(Error::write(output, reason).into())
         }
         None => Ok(()),

@@ -1,4 +1,4 @@
-//! Reading, matching and writing at once.
+//! Reading, matching and writing at the same time.
 
 use std::ops::ControlFlow;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel, sync_channel};
@@ -18,49 +18,49 @@ use crate::failure::{Failure, Result};
 use crate::outputs::{Files, MatchRecord};
 use crate::pairs::input;
 use crate::progress::Counter;
-use crate::sequences::{Frame, Frames, Rectifier, turned};
+use crate::sequences::{FramePair, Frames, Rectifier, turned};
 use crate::text::plural;
 use crate::{console, remedy, stop};
 
-use super::writer::{Found, Sink};
+use super::writer::{MatchedFrame, Sink};
 
-/// Frames that wait between two steps: enough to keep both at work.
+/// Frames queued between two steps, enough to keep both busy.
 const WAITING: usize = 2;
-/// How often a wait for a frame looks whether the user has stopped it.
+/// Interval at which a wait for a frame checks for a stop.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// What matches the frames.
+/// Matches the frames of a sequence.
 pub(super) struct Pipeline {
     pub(super) matcher: Matcher,
     pub(super) range: DisparityRange,
-    /// The region that is wanted, where it is not all.
+    /// The selected region; `None` for all of the view.
     pub(super) region: Option<Region>,
-    /// What the records say of the inputs.
+    /// The input paths for the records.
     pub(super) files: Files,
     pub(super) rectified: bool,
-    /// Whether frames are corrected where the right camera has turned.
+    /// Whether frames are corrected for a right camera that has turned.
     pub(super) recalibrate: bool,
     pub(super) quiet: bool,
 }
 
-/// What the writer takes beside the maps.
+/// Data that the writer needs besides the maps.
 #[derive(Clone, Copy)]
-struct Takes {
+struct WriterNeeds {
     pair: bool,
     record: bool,
 }
 
-/// A rectified frame, and how the right camera has turned by then; or why there is none.
-type Next = Result<(Frame, Option<Turn>)>;
+/// A rectified frame with the turn of the right camera so far, or the error that ended the frames.
+type NextFrame = Result<(FramePair, Option<Turn>)>;
 
 impl Pipeline {
-    /// Matches `first`, which is rectified, and all `frames`, which `rectifier` rectifies, and writes what it finds.
+    /// Matches `first`, which is already rectified, and all `frames`, which `rectifier` rectifies, and writes the results.
     ///
     /// # Errors
-    /// Of reading, matching and writing, and when the user stops it. What was found before is written then.
+    /// Errors of reading, matching and writing, and a stop by the user. Earlier results are written in any case.
     pub(super) fn run(
         mut self,
-        first: Frame,
+        first: FramePair,
         frames: Frames,
         mut rectifier: Rectifier,
         sink: &mut Sink,
@@ -68,14 +68,14 @@ impl Pipeline {
         let start = Instant::now();
         let region = self.region.as_ref();
         let size = region.map_or(first.pair.size(), |region| region.part().size());
-        let takes = Takes { pair: sink.takes_pair(), record: sink.takes_records() };
+        let takes = WriterNeeds { pair: sink.takes_pair(), record: sink.takes_records() };
         let mut bar = Counter::of_frames(frames.len(), self.quiet);
         let (sender, receiver) = sync_channel(WAITING);
         let turn = rectifier.followed(&first.pair)?;
         let told = first.pair.doubts().each_ref().map(|doubt| self.quiet || doubt.is_some());
-        // It may wait for standard input for ever, so nobody waits for it.
+        // Not joined, as it may wait for standard input forever.
         thread::spawn(move || read(frames, rectifier, told, &sender));
-        let (found, to_write) = sync_channel::<Found>(WAITING);
+        let (found, to_write) = sync_channel::<MatchedFrame>(WAITING);
         let (matched, written) = thread::scope(|scope| {
             let writing = scope.spawn(|| write(to_write, sink, &mut bar));
             let matched = self.matched((first, turn), &receiver, takes, start, found);
@@ -84,8 +84,8 @@ impl Pipeline {
         drop(bar);
         let (done, written) =
             written.unwrap_or((0, Err(Failure::Failed("the writer of maps failed".into()))));
-        let Ran { on, note, turn, ended } = matched;
-        // A failure to write ends the matching, so it is the cause.
+        let MatchingOutcome { on, note, turn, ended } = matched;
+        // A failed writer also ends the matching, so its error is the cause.
         let ended = written.and(ended);
         if !self.quiet {
             if let Some(note) = note {
@@ -97,7 +97,7 @@ impl Pipeline {
             let seconds = start.elapsed().as_secs_f64();
             let (width, height) = size;
             console::say(&format!(
-                "{done} frame{} of {width} x {height}, {} labels, in {seconds:.2} s: {:.1} a second{}",
+                "{done} frame{} of {width} x {height}, {} labels, in {seconds:.2} s: {:.1} per second{}",
                 plural(done),
                 self.range.labels(),
                 done as f64 / seconds,
@@ -110,24 +110,24 @@ impl Pipeline {
         })
     }
 
-    /// Matches all frames and hands on what it finds.
+    /// Matches all frames and passes the results on.
     fn matched(
         &mut self,
-        first: (Frame, Option<Turn>),
-        frames: &Receiver<Next>,
-        takes: Takes,
+        first: (FramePair, Option<Turn>),
+        frames: &Receiver<NextFrame>,
+        takes: WriterNeeds,
         start: Instant,
-        found: SyncSender<Found>,
-    ) -> Ran {
+        found: SyncSender<MatchedFrame>,
+    ) -> MatchingOutcome {
         let Self { matcher, range, region, files, rectified, .. } = self;
         let region = region.as_ref();
-        // What is shown of a pair, and what is matched of it.
+        // Crops a pair to the region, and to the window that must be matched for it.
         let narrowed = |pair: Pair| match region {
             Some(region) => (pair.crop(region.part()), region.window_of(&pair)),
             None => (pair.clone(), pair),
         };
         let range = *range;
-        // The frames that are being matched.
+        // The frames being matched.
         let (started, under_way) = channel();
         let mut failure = None;
         let mut next = Some(Ok(first));
@@ -140,13 +140,13 @@ impl Pipeline {
                         return None;
                     }
                 };
-            // The receiver lives as long as this.
+            // The receiver outlives this send, so it cannot fail.
             let (part, window) = narrowed(frame.pair);
             let about = (frame.name, frame.header, turn);
             let _ = started.send((about, part.georeferences(), takes.pair.then_some(part)));
             Some((window, range))
         });
-        let mut ran = Ran { on: None, note: None, turn: None, ended: Ok(()) };
+        let mut ran = MatchingOutcome { on: None, note: None, turn: None, ended: Ok(()) };
         let told = &mut ran;
         let ended = matcher.run_all_until(pairs, stop::flag(), move |mut matched| {
             let Ok(((name, header, turn), georeferences, pair)) = under_way.try_recv() else {
@@ -165,9 +165,9 @@ impl Pipeline {
                 line(&name, turn.map(|turn| turn.degrees()), &record)
             });
             told.on = Some(matched.ran_on);
-            match found.send(Found { name, header, georeferences, maps: matched.maps, pair, record }) {
+            match found.send(MatchedFrame { name, header, georeferences, maps: matched.maps, pair, record }) {
                 Ok(()) => ControlFlow::Continue(()),
-                // It tells why.
+                // The writer reports the cause when it is joined.
                 Err(_) => ControlFlow::Break(()),
             }
         });
@@ -180,7 +180,7 @@ impl Pipeline {
     }
 }
 
-/// The record of a frame in a line of JSON.
+/// The record of a frame as a line of JSON.
 fn line(frame: &str, turned: Option<[f64; 3]>, record: &MatchRecord) -> String {
     #[derive(Serialize)]
     struct Line<'a> {
@@ -190,25 +190,25 @@ fn line(frame: &str, turned: Option<[f64; 3]>, record: &MatchRecord) -> String {
         #[serde(flatten)]
         record: &'a MatchRecord<'a>,
     }
-    // Its fields are numbers, texts and maps of texts, which JSON holds.
+    // Cannot fail: all fields are numbers, texts and maps with text keys.
     serde_json::to_string(&Line { frame, turned, record }).unwrap_or_default() + "\n"
 }
 
-/// What came of the matching.
-struct Ran {
-    /// What ran the stages.
+/// The outcome of the matching.
+struct MatchingOutcome {
+    /// The device.
     on: Option<String>,
     /// Why it did not run on the preferred device.
     note: Option<String>,
-    /// How the right camera has turned by the last frame.
+    /// The turn of the right camera at the last frame.
     turn: Option<Turn>,
     ended: Result<()>,
 }
 
-/// Does `work`, which may wait for standard input for ever.
+/// Runs `work`, which may wait for standard input forever.
 ///
 /// # Errors
-/// When the user stops it.
+/// If the user stops it.
 pub(super) fn patiently<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T> {
     let (sender, receiver) = sync_channel(1);
     thread::spawn(move || sender.send(work()));
@@ -218,10 +218,10 @@ pub(super) fn patiently<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'st
     }
 }
 
-/// What comes next; `None` after the last one.
+/// The next item; `None` after the last one.
 ///
 /// # Errors
-/// When the user stops it.
+/// If the user stops it.
 fn received<T>(from: &Receiver<T>) -> Option<Result<T>> {
     loop {
         if stop::go_on().is_break() {
@@ -235,9 +235,9 @@ fn received<T>(from: &Receiver<T>) -> Option<Result<T>> {
     }
 }
 
-/// Reads and rectifies frames until one fails or nobody takes them. Says which frame of each camera is the first with a damaged image,
-/// where that was not `told`.
-fn read(frames: Frames, mut rectifier: Rectifier, mut told: [bool; 2], to: &SyncSender<Next>) {
+/// Reads and rectifies frames until one fails or the receiver is gone. Warns of the first damaged image of each camera, unless it has been
+/// `told`.
+fn read(frames: Frames, mut rectifier: Rectifier, mut told: [bool; 2], to: &SyncSender<NextFrame>) {
     for frame in frames {
         let doubts = frame.iter().flat_map(|frame| frame.pair.doubts().iter().enumerate());
         for (side, doubt) in doubts {
@@ -245,9 +245,9 @@ fn read(frames: Frames, mut rectifier: Rectifier, mut told: [bool; 2], to: &Sync
                 input::warn([Warning::Damaged { doubt: doubt.clone() }]);
             }
         }
-        let rectified = |Frame { name, header, pair }: Frame| {
+        let rectified = |FramePair { name, header, pair }: FramePair| {
             let (pair, turn) = rectifier.rectified(pair)?;
-            Ok((Frame { name, header, pair }, turn))
+            Ok((FramePair { name, header, pair }, turn))
         };
         let frame = frame.map_err(Failure::from).and_then(rectified);
         let failed = frame.is_err();
@@ -257,8 +257,8 @@ fn read(frames: Frames, mut rectifier: Rectifier, mut told: [bool; 2], to: &Sync
     }
 }
 
-/// Writes what comes. Returns how many frames it wrote.
-fn write(found: Receiver<Found>, sink: &mut Sink, bar: &mut Counter) -> (usize, Result<()>) {
+/// Writes the frames that arrive. Returns how many were written.
+fn write(found: Receiver<MatchedFrame>, sink: &mut Sink, bar: &mut Counter) -> (usize, Result<()>) {
     let mut done = 0;
     let mut ended = Ok(());
     for found in found {

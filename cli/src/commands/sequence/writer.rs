@@ -1,4 +1,4 @@
-//! Where the maps of a sequence go.
+//! Destinations for the maps of a sequence.
 
 use std::fs;
 use std::io::Write as _;
@@ -22,48 +22,48 @@ use crate::outputs::messages::Messages;
 use crate::outputs::{Film, MapArgs, Outcome, RecordedMaps, ShownMaps, files, is_printed};
 use crate::sequences::FrameRate;
 
-/// Frames a second where nothing says it.
+/// Frames per second if nothing else tells.
 const RATE: FrameRate = (25, 1);
 
-/// What is written of every frame.
+/// Settings of the outputs of every frame.
 pub(super) struct Writer<'a> {
     pub(super) output: &'a Path,
     pub(super) wanted: &'a MapArgs,
     pub(super) range: DisparityRange,
     pub(super) rig: Option<Rig>,
     pub(super) sigma: Sigma,
-    /// The rotation from the frame of the left camera to the rectified one, where frames are rectified.
+    /// The rotation from the left camera's frame to the rectified frame, if frames are rectified.
     pub(super) rectifying: Option<Matrix>,
-    /// The camera that an output is in the view of.
+    /// The camera of `--into`.
     pub(super) third: Option<ThirdCamera>,
-    /// How many frames there are a second, where that is known.
+    /// The frame rate, if known.
     pub(super) rate: Option<FrameRate>,
-    /// Lets maps follow those before, where that is asked for.
+    /// Temporal smoothing (`--steady`).
     pub(super) steady: Option<Steady>,
 }
 
-/// A frame that has been matched.
-pub(super) struct Found {
+/// A matched frame.
+pub(super) struct MatchedFrame {
     pub(super) name: String,
-    /// Time and camera, where it was recorded.
+    /// Time and camera, for a recorded frame.
     pub(super) header: Option<Header>,
     pub(super) maps: Maps,
-    /// Those of both views.
+    /// The georeferences of both views.
     pub(super) georeferences: [Option<Georeference>; 2],
-    /// The pair, where an output shows it.
+    /// The pair, if an output shows it.
     pub(super) pair: Option<Pair>,
-    /// What ran and what it found, as a line of JSON, where that is asked for.
+    /// The record as a line of JSON, if selected.
     pub(super) record: Option<String>,
 }
 
-/// Where the records of the frames go.
+/// The destination of the records.
 pub(super) enum Records {
     Printed,
     File(PathBuf, Growing),
 }
 
 impl Records {
-    /// In the file `path`, or `-` for standard output.
+    /// Records in the file `path`, or `-` for standard output.
     pub(super) fn new(path: &Path) -> Result<Self> {
         if is_printed(path) {
             Ok(Self::Printed)
@@ -89,48 +89,48 @@ impl Records {
     }
 }
 
-/// Where the maps go.
+/// The destination of the maps.
 #[allow(clippy::large_enum_variant, reason = "there is one of it")]
-enum To {
+enum Destination {
     Folder,
     Film(Film),
     Recording(RecordedMaps),
     Viewer(ShownMaps),
 }
 
-/// The output, with what is in it so far.
+/// An output and the state of writing it.
 pub(super) struct Sink<'a> {
     writer: Writer<'a>,
-    to: To,
-    /// How many frames it has.
+    to: Destination,
+    /// The number of frames written.
     count: usize,
     records: Option<Records>,
 }
 
 impl<'a> Writer<'a> {
-    fn begin(self, to: To, records: Option<Records>) -> Sink<'a> {
+    fn begin(self, to: Destination, records: Option<Records>) -> Sink<'a> {
         Sink { writer: self, to, count: 0, records }
     }
 
     /// Begins a film.
     pub(super) fn begin_film(self, records: Option<Records>) -> Sink<'a> {
-        let film = To::Film(Film::new(self.output, self.rate));
+        let film = Destination::Film(Film::new(self.output, self.rate));
         self.begin(film, records)
     }
 
     /// Begins a recording of these `messages`.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If it cannot be written.
     pub(super) fn begin_recording(self, messages: Messages, records: Option<Records>) -> Result<Sink<'a>> {
-        let recording = To::Recording(RecordedMaps::new(self.output, messages)?);
+        let recording = Destination::Recording(RecordedMaps::new(self.output, messages)?);
         Ok(self.begin(recording, records))
     }
 
-    /// Begins to show these `messages` at an address. Returns where that is.
+    /// Begins to serve these `messages` at an address. Returns the URL.
     ///
     /// # Errors
-    /// Where nobody can listen there.
+    /// If it cannot listen there.
     pub(super) fn begin_viewer(
         self,
         address: &str,
@@ -139,13 +139,13 @@ impl<'a> Writer<'a> {
     ) -> Result<(Sink<'a>, String)> {
         let shown = ShownMaps::new(address, messages)?;
         let address = shown.address();
-        Ok((self.begin(To::Viewer(shown), records), address))
+        Ok((self.begin(Destination::Viewer(shown), records), address))
     }
 
-    /// Begins a folder, which may be there.
+    /// Begins a folder, which may exist.
     ///
     /// # Errors
-    /// Where it cannot be made, or a map cannot be stored in its format.
+    /// If it cannot be created, or its format cannot store the range.
     pub(super) fn begin_folder(self, records: Option<Records>) -> Result<Sink<'a>> {
         let is_new = files::create_folder(self.output).map_err(|e| Error::write(self.output, e))?;
         let checked = self.wanted.check(self.output, "000000", self.range);
@@ -153,23 +153,23 @@ impl<'a> Writer<'a> {
             let _ = fs::remove_dir(self.output);
         }
         checked?;
-        Ok(self.begin(To::Folder, records))
+        Ok(self.begin(Destination::Folder, records))
     }
 }
 
 impl Sink<'_> {
-    /// Whether it takes the pair, too.
+    /// Whether it needs the pair.
     pub(super) fn takes_pair(&self) -> bool {
         self.writer.wanted.also.show_left() || self.writer.steady.is_some()
     }
 
-    /// Whether it takes records.
+    /// Whether it needs records.
     pub(super) fn takes_records(&self) -> bool {
         self.records.is_some()
     }
 
     /// Writes a frame.
-    pub(super) fn add(&mut self, mut found: Found) -> Result<()> {
+    pub(super) fn add(&mut self, mut found: MatchedFrame) -> Result<()> {
         if let (Some(steady), Some(pair)) = (&mut self.writer.steady, &found.pair) {
             steady.follow(pair.left(), &mut found.maps);
         }
@@ -179,16 +179,16 @@ impl Sink<'_> {
         let (sign, sigma) = (Sign::default(), Some(sigma));
         let outcome = Outcome { maps, range, sign, left, rig, rectifying, third, sigma, georeferences };
         match &mut self.to {
-            To::Folder => wanted.write(output, &found.name, &outcome)?,
-            To::Film(film) => film.add(&wanted.also.film_picture(&outcome))?,
-            To::Recording(_) | To::Viewer(_) => {
+            Destination::Folder => wanted.write(output, &found.name, &outcome)?,
+            Destination::Film(film) => film.add(&wanted.also.film_picture(&outcome))?,
+            Destination::Recording(_) | Destination::Viewer(_) => {
                 let header = found.header.clone().unwrap_or_else(|| header(&found.name, self.count, rate));
                 let map = outcome.final_map(wanted.also.limits);
                 let (sigma, contents) = (outcome.typical_sigma(), wanted.also.contents(&outcome));
                 match &mut self.to {
-                    To::Recording(recording) => recording.add(&header, &map, sigma, contents)?,
-                    To::Viewer(viewer) => viewer.add(&header, &map, sigma, contents)?,
-                    To::Folder | To::Film(_) => {}
+                    Destination::Recording(recording) => recording.add(&header, &map, sigma, contents)?,
+                    Destination::Viewer(viewer) => viewer.add(&header, &map, sigma, contents)?,
+                    Destination::Folder | Destination::Film(_) => {}
                 }
             }
         }
@@ -199,26 +199,26 @@ impl Sink<'_> {
         }
     }
 
-    /// Ends film or recording, and records.
+    /// Ends a film or a recording, and the records.
     pub(super) fn finish(&mut self) -> Result<()> {
-        let ended = match std::mem::replace(&mut self.to, To::Folder) {
-            To::Folder | To::Viewer(_) => Ok(()),
-            To::Film(film) => film.finish(),
-            To::Recording(recording) => recording.finish(),
+        let ended = match std::mem::replace(&mut self.to, Destination::Folder) {
+            Destination::Folder | Destination::Viewer(_) => Ok(()),
+            Destination::Film(film) => film.finish(),
+            Destination::Recording(recording) => recording.finish(),
         };
         self.records.take().map_or(Ok(()), Records::finish)?;
         Ok(ended?)
     }
 }
 
-/// What a frame that was not recorded has in the place of its header: the time in its name, or that of its number.
+/// The header of a frame that was not recorded: its time is in its name, or follows from its number.
 fn header(name: &str, count: usize, rate: Option<FrameRate>) -> Header {
     let (frames, seconds) = rate.unwrap_or(RATE);
     let of_number = || Stamp((count as i128 * i128::from(SECOND) * seconds as i128 / frames as i128) as i64);
     Header { stamp: time_in(name).unwrap_or_else(of_number), frame_id: "left".into() }
 }
 
-/// The time that a name is: seconds with decimals, or nanoseconds.
+/// Parses a name that is a time: seconds with decimals, or nanoseconds of 19 digits.
 fn time_in(name: &str) -> Option<Stamp> {
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     match name.split_once('.') {

@@ -1,4 +1,4 @@
-// Lets a test match the scene beside the page, and answers with the bytes of the maps.
+// Lets a test match the scene in the page, and returns the bytes of the maps.
 import { createMatcher, type Options } from '@mrfgs/wasm';
 
 async function bitmap(url: string): Promise<ImageBitmap> {
