@@ -155,11 +155,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 fn behind(args: &Args, map: &Plane<f32>, rig: &Rig) -> Result<Option<String>> {
     let in_front = InFront::of(map, rig);
     if in_front.all == 0 {
-        return Err(Error::read(
-            &args.map,
-            "contains no disparity: all pixels are infinite or NaN",
-        )
-        .into());
+        return Err(Error::read(&args.map, "contains no disparity: all pixels are infinite or NaN").into());
     }
     let check = "check that the calibration is of this map, and that the map is not empty";
     match in_front.doubt(&other_sign(args.sign), check) {
