@@ -716,8 +716,13 @@ except KeyboardInterrupt:
 
     def interrupted(self, device):
         during = 0
+        # Drivers complain on standard error where there is no such folder.
+        runtime = tempfile.TemporaryDirectory()
+        self.addCleanup(runtime.cleanup)
+        environment = {"XDG_RUNTIME_DIR": runtime.name, **os.environ}
         for delay in (0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 2):
-            with subprocess.Popen([sys.executable, "-c", self.CODE, device], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            with subprocess.Popen([sys.executable, "-c", self.CODE, device], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                  env=environment) as process:
                 self.addCleanup(process.kill)
                 self.assertEqual(process.stdout.readline(), "ready\n")
                 time.sleep(delay)
