@@ -9,8 +9,8 @@
 use super::{Descriptor, Map, maps};
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |_| maps(&[Map::RightLabel, Map::RightBest]),
-    writes: |_| maps(&[Map::Label, Map::Best]),
+    reads: |_| maps(&[Map::Label, Map::Best]),
+    writes: |_| maps(&[Map::RightLabel, Map::RightBest]),
     pixel: 4.0,
     ..Descriptor::NONE
 };
