@@ -6,15 +6,18 @@ use crate::stage::{Data, Place, Volume};
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
-/// From the first to the last of `steps` that reads or writes each of their data.
-fn lives(plan: &Plan, steps: &[Step]) -> HashMap<Data, RangeInclusive<usize>> {
-    let mut lives = HashMap::new();
+/// The steps at which each datum is needed: from the first to the last that reads or writes it, or, for scratch memory, each step alone.
+fn lives(plan: &Plan, steps: &[Step]) -> HashMap<Data, Vec<RangeInclusive<usize>>> {
+    let mut lives: HashMap<_, Vec<RangeInclusive<usize>>> = HashMap::new();
     for (at, step) in steps.iter().enumerate() {
         let Step::Run(run) = step else { continue };
         for stage in run.stages() {
-            for data in stage.reads(plan).chain(stage.writes()).chain(stage.needs(plan)) {
-                let life = lives.entry(data).or_insert(at..=at);
-                *life = *life.start()..=at;
+            for data in stage.reads(plan).chain(stage.writes()) {
+                let first = lives.get(&data).map_or(at, |life| *life[0].start());
+                lives.insert(data, vec![first..=at]);
+            }
+            for data in stage.needs(plan) {
+                lives.entry(data).or_default().push(at..=at);
             }
         }
     }
@@ -46,14 +49,14 @@ fn pairs(plan: &Plan) -> Vec<[Data; 2]> {
 pub fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
     let lives = lives(plan, &steps);
     let apart = |pair: [Data; 2]| match pair.map(|data| lives.get(&data)) {
-        [Some(a), Some(b)] => a.end() < b.start() || b.end() < a.start(),
+        [Some(a), Some(b)] => a.iter().all(|a| b.iter().all(|b| a.end() < b.start() || b.end() < a.start())),
         _ => true,
     };
     plan.shares = pairs(plan).into_iter().all(apart);
     let mut freed: HashMap<usize, Vec<Step>> = HashMap::new();
     for z in 0..plan.levels.len() {
         let graph = Data::Members(z);
-        if let Some(life) = lives.get(&graph) {
+        if let Some([life]) = lives.get(&graph).map(Vec::as_slice) {
             freed.entry(*life.end()).or_default().push(Step::Free(graph));
         }
     }

@@ -4,11 +4,16 @@
 //! (They are one stage so that a belief can be summed while its messages are at hand; the values
 //! are those of the two stages in turn.)
 
-use super::{Descriptor, belief, dependency};
+use super::{Data, Descriptor, Volume, volumes};
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |z| [(dependency::ROW.reads)(z), (belief::ROW.reads)(z)].concat(),
-    writes: |z| [(dependency::ROW.writes)(z), (belief::ROW.writes)(z)].concat(),
+    reads: |z| {
+        let messages = [Volume::Dependency(z), Volume::Down(z), Volume::Up(z)].map(Data::Volume);
+        let summands = [Volume::Belief(z), Volume::Evidence(z)].map(Data::Volume);
+        let graph = [Data::Members(z), Data::Incoming(z), Data::Windows(z)];
+        summands.into_iter().chain(messages).chain(graph).collect()
+    },
+    writes: |z| volumes(&[Volume::Dependency(z), Volume::Belief(z)]),
     joins: true,
     cell: 0.9,
     ..Descriptor::NONE

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::plan::patches::{
     PATCH, PATCH_APART, PATCH_AWAY, PATCH_DOUBT, PATCH_FAR_BITS, PATCH_LEAST, PATCH_MOMENT, PATCH_OUTVOTES,
     PATCH_REACH, PATCH_RESIDUAL, PATCH_RIDGE, PATCH_ROUNDS, PATCH_SHARE_BITS, PATCH_SPREAD, PATCH_STEEPEST,
-    PATCH_STEP, PATCH_STEP_BITS, PATCH_WEIGHT_BITS, patches,
+    PATCH_STEP, PATCH_STEP_BITS, PATCH_WEIGHT_BITS, are_taken, patches,
 };
 use crate::stage::{Data, Extent};
 use crate::weights::PATCH_DIFFERENCES;
@@ -50,6 +50,9 @@ fn variant(loops: usize) -> Variant {
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    if !are_taken(&r.plan.method) {
+        return Ok(());
+    }
     let (l, plan) = (r.params(), r.plan);
     let (across, down) = patches(plan);
     let (across, down) = (across as u32, down as u32);

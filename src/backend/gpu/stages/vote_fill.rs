@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::options::Nearer;
 use crate::plan::votes::{
     HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_OUTVOTES,
-    VOTE_REACH, VOTE_SHIFT, VOTE_SURE, Votes,
+    VOTE_REACH, VOTE_SHIFT, VOTE_SURE, Votes, are_taken,
 };
 use crate::stage::{Data, Extent};
 use crate::weights::COLOUR_DIFFERENCES;
@@ -52,6 +52,9 @@ fn variant(loops: usize) -> Variant {
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    if !are_taken(&r.plan.method) {
+        return Ok(());
+    }
     let (l, plan, votes) = (r.params(), r.plan, Votes::of(r.plan));
     let pitch = |data: Data| data.array(plan).words as u32;
     let own = Uniform {
