@@ -1,7 +1,7 @@
 //! The stages of the method: the one table that lists them, and what is true of each.
 //!
 //! A row of [`for_every_stage`](crate::for_every_stage) gives the variant of [`Stage`] and the name of its files: `stage/NAME.rs`
-//! with its exact definition and its [`Descriptor`], `backend/cpu/NAME.rs`, `backend/gpu/NAME.rs`, `shaders/NAME.wgsl`, and the
+//! with its exact definition and its [`Descriptor`], `backend/cpu/stages/NAME.rs`, `backend/gpu/stages/NAME.rs`, `shaders/NAME.wgsl`, and the
 //! twin and the test of that name. Whatever needs a list of all stages follows from this table.
 
 mod data;
