@@ -293,7 +293,8 @@ fn check_data(stage: Stage, plan: &Plan, kernels: &[Kernel]) -> Result<HashSet<D
                 now.extend(all.iter().copied());
             }
             if usage.contains(GlobalUse::READ) && !declared(&reads) && !declared(&written) {
-                let both = usage.contains(GlobalUse::WRITE) && declared(&needs);
+                // Atomic scratch memory, or one of several maps in an array, the others of which stay.
+                let both = usage.contains(GlobalUse::WRITE) && (declared(&needs) || all.len() > 1);
                 if !both {
                     return error("is read, and neither declared nor written before, by");
                 }
@@ -349,28 +350,32 @@ fn undeclared_data_are_noticed() {
     assert!(check(&fill[1..]).is_err());
 }
 
-/// The steps of a match in one piece.
-fn steps_of(plan: &Plan) -> Vec<Step> {
-    Program::new(&Tiles::in_one_piece(plan)).unwrap().steps
+/// The match by `plan`, in one piece.
+fn program_of(plan: &Plan) -> Program {
+    Program::new(&Tiles::in_one_piece(plan)).unwrap()
 }
 
-/// Whether each datum that `steps` read has been written before, or was there from the start.
-fn check_order(plan: &Plan, steps: &[Step]) -> Result<(), String> {
-    let at_start = |data: &Data| data.array(plan).start != Start::Anything;
-    let mut written: HashSet<_> = Data::all(plan).into_iter().filter(at_start).collect();
-    // Windows hold all labels until they are found.
-    written.extend((0..plan.levels.len()).map(Data::Windows));
-    for stage in steps.iter().filter_map(Step::stage) {
-        // Without messages of its factors, a level needs no graph; and a check that is off looks at no right view.
+/// Checks that each datum that `program` reads was written before, or was there from the start.
+fn check_order(program: &Program) -> Result<(), String> {
+    let mut written = HashSet::new();
+    for (step, plan) in program.with_plans() {
+        if let Step::Enter(_) | Step::Condition = step {
+            written.extend(Data::all(plan).into_iter().filter(|data| data.array(plan).start != Start::Anything));
+            // Windows hold all labels until they are found.
+            written.extend((0..plan.levels.len()).map(Data::Windows));
+        }
+        // A level whose factors send no messages needs no graph, and a check that is off ignores the right view.
         let counts = |data: &Data| match *data {
             Data::Members(z) | Data::Incoming(z) => plan.floods(z),
             Data::Map(Map::RightLabel) => plan.method.refinement.left_right_check != LeftRightCheck::Off,
             _ => true,
         };
-        if let Some(data) = stage.reads(plan).filter(counts).find(|data| !written.contains(data)) {
-            return Err(format!("{stage:?} reads {data:?}, which nobody has written"));
+        if let Some(stage) = step.stage() {
+            if let Some(data) = stage.reads(plan).filter(counts).find(|data| !written.contains(data)) {
+                return Err(format!("{stage:?} reads {data:?}, which nobody has written"));
+            }
+            written.extend(stage.writes());
         }
-        written.extend(stage.writes());
     }
     Ok(())
 }
@@ -378,15 +383,14 @@ fn check_order(plan: &Plan, steps: &[Step]) -> Result<(), String> {
 #[test]
 fn data_are_written_before_they_are_read() {
     for plan in PLANS.iter() {
-        check_order(plan, &steps_of(plan))
-            .unwrap_or_else(|error| panic!("{error}: {:?}", plan.method));
+        let order = check_order(&program_of(plan));
+        order.unwrap_or_else(|error| panic!("{error}: {:?}", plan.method));
     }
     // Control: without the stage that finds the labels, those that read them are noticed.
-    let plan = &PLANS[0];
-    let steps: Vec<_> = steps_of(plan);
     let without = |missing: Stage| {
-        let rest = steps.iter().filter(|step| step.stage() != Some(missing)).cloned();
-        check_order(plan, &rest.collect::<Vec<_>>())
+        let mut program = program_of(&PLANS[0]);
+        program.steps.retain(|step| step.stage() != Some(missing));
+        check_order(&program)
     };
     assert!(without(Stage::WinnerTakesAll).is_err());
     assert!(without(Stage::Evidence(0)).is_err());

@@ -140,6 +140,41 @@ fn wrong_tiles_are_noticed() {
     assert_eq!(check(&bare, OVERLAP).unwrap_err(), "the overlap above and below");
 }
 
+/// Maps of tiles depend on where an image is cut, so that a change of the memory that a plan counts must move no cut.
+#[test]
+fn images_are_cut_where_they_always_were() {
+    // Size, preset, largest disparity, memory in MiB; number of tiles, and the size of the largest.
+    let cuts = [
+        ((450, 375), "default", 63, 60, 6, (256, 224)),
+        ((450, 375), "default", 255, 150, 20, (416, 96)),
+        ((450, 375), "fast", 63, 24, 20, (128, 96)),
+        ((450, 375), "paper", 63, 60, 10, (320, 128)),
+        ((450, 375), "paper", 63, 150, 2, (450, 224)),
+        ((450, 375), "paper", 255, 150, 30, (384, 96)),
+        ((450, 375), "paper", 255, 400, 2, (450, 224)),
+        ((1280, 720), "default", 63, 150, 18, (320, 288)),
+        ((1280, 720), "default", 255, 400, 12, (640, 256)),
+        ((1280, 720), "fast", 255, 150, 35, (256, 128)),
+        ((1280, 720), "paper", 63, 150, 21, (512, 160)),
+        ((1280, 720), "paper", 63, 400, 4, (704, 416)),
+        ((1280, 720), "paper", 255, 400, 28, (576, 160)),
+        ((1280, 720), "paper", 255, 1024, 6, (1280, 192)),
+        ((3000, 2000), "default", 63, 1024, 6, (1568, 736)),
+        ((3000, 2000), "default", 255, 1024, 24, (1216, 320)),
+        ((3000, 2000), "fast", 255, 1024, 3, (1500, 360)),
+        ((3000, 2000), "paper", 63, 400, 273, (352, 160)),
+        ((3000, 2000), "paper", 63, 1024, 12, (1088, 576)),
+        ((3000, 2000), "paper", 255, 1024, 80, (864, 192)),
+    ];
+    for (size, preset, max, memory, count, largest) in cuts {
+        let method = Method::preset(preset).unwrap();
+        let tiles = Tiles::new(&plan(size, DisparityRange::new(0, max).unwrap(), &method, memory)).unwrap();
+        let sizes = tiles.list().iter().map(|tile| tile.crop.size());
+        let found = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap();
+        assert_eq!((tiles.count(), found), (count, largest), "{size:?}, {preset}, {max}, {memory} MiB");
+    }
+}
+
 #[test]
 fn the_shape_with_the_fewest_cropped_pixels_is_taken() {
     // With few labels, tiles are as square as the image allows; with many, they are full rows.
