@@ -112,13 +112,16 @@ impl Buffers {
         for z in (0..levels.len()).rev() {
             let parts = Parts::of(a.device, plan, z)?;
             let there = |data: &Data| data.is_there(plan);
-            for (kind, data) in Data::of_levels(z).into_iter().enumerate().filter(|(_, data)| there(data)) {
+            for (kind, data) in Data::of_levels(z).into_iter().enumerate() {
                 let array = data.array(plan);
                 let rows = match pools.get_mut(kind) {
                     Some(pool) if z >= finest_shared => pool.rows(array.words as u32, array.rows as u32),
-                    _ => parts.rows(a, data, &array)?,
+                    _ if there(&data) => parts.rows(a, data, &array)?,
+                    _ => continue,
                 };
-                arrays.insert((array.name, z), (array, rows));
+                if there(&data) {
+                    arrays.insert((array.name, z), (array, rows));
+                }
             }
             for data in Data::of_level(z).into_iter().filter(there) {
                 let array = data.array(plan);
@@ -210,9 +213,11 @@ impl Buffers {
         let kinds = 0..Data::of_levels(0).len();
         let pools = kinds.map(|kind| {
             let all = (finest..plan.levels.len()).map(|z| Data::of_levels(z)[kind]);
-            let all: Vec<_> = all.filter(|data| data.is_there(plan)).map(|data| data.array(plan)).collect();
-            let name = all.last().map_or("nothing", |array| array.name);
-            Ok(Pool::new(a.buffer(name, all.iter().map(|array| array.bytes() / 4).sum())?))
+            // A level begins at one place in all volumes, so that there is room for messages that the coarsest level does not have.
+            let all: Vec<_> = all.filter(|data| *data != Data::Volume(Volume::Up(0))).collect();
+            let arrays: Vec<_> = all.iter().map(|data| data.array(plan)).collect();
+            let name = arrays.last().map_or("nothing", |array| array.name);
+            Ok(Pool::new(a.buffer(name, arrays.iter().map(|array| array.bytes() / 4).sum())?))
         });
         pools.collect()
     }
