@@ -1,6 +1,6 @@
-//! Every shader in every variant that a plan can need, without a device: it validates without optional
-//! capabilities, its layouts match the Rust structs, it stays within the limits of every device, and it
-//! translates to the shading languages of all platforms.
+//! Every shader in every variant, without a device: it validates without optional capabilities, its layouts
+//! match the Rust structs, it stays within the limits of all devices, and it translates to the shading
+//! languages of all platforms.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -63,7 +63,7 @@ fn every_stage_has_a_shader_and_every_shader_a_stage() {
     let kernels: HashSet<String> = KERNELS.iter().map(|kernel| kernel.shader.stage.to_owned()).collect();
     assert_eq!(files, kernels);
     let mut stages: HashSet<&str> = PLANS.iter().flat_map(Stage::all).map(Stage::name).collect();
-    // The sweep and `fill_plane` run shaders of other stages, and the upload is no stage.
+    // `flood` and `fill_plane` run shaders of other stages, and `upload` is not a stage.
     assert!(stages.remove("flood") && stages.remove("fill_plane") && stages.insert("upload"));
     assert_eq!(kernels, stages.into_iter().map(str::to_owned).collect());
 }
@@ -128,7 +128,7 @@ fn uniforms_are_laid_out_as_the_rust_structs() {
 
 /// Control: an exchanged field is detected.
 #[test]
-fn a_different_uniform_layout_is_noticed() {
+fn control_a_different_uniform_layout_is_found() {
     let kernel = &kernels(Stage::Evidence(0), &PLANS[0])[0];
     let source = kernel.shader.source();
     let fields = |source: &str| layout_of(&validated(source).unwrap().0, "Params").unwrap().0;
@@ -141,7 +141,7 @@ fn a_different_uniform_layout_is_noticed() {
     )));
 }
 
-/// The index of the entry point of the kernel.
+/// The index of the kernel's entry point.
 fn entry_point(kernel: &Kernel, module: &Module) -> usize {
     module.entry_points.iter().position(|e| e.name == kernel.shader.entry).expect("it compiles")
 }
@@ -170,7 +170,7 @@ fn every_kernel_binds_what_its_entry_point_uses() {
 /// Control: bindings that the shader lacks, that the entry point does not use, or that are missing, are
 /// detected.
 #[test]
-fn wrong_bindings_are_noticed() {
+fn control_wrong_bindings_are_found() {
     let kernel = &kernels(Stage::Evidence(0), &PLANS[0])[0];
     let source = kernel.shader.source();
     let names = |kernel: &Kernel| kernel.bound.iter().map(|bound| bound.name).collect::<Vec<_>>();
@@ -255,8 +255,8 @@ fn every_shader_translates_to_spirv_msl_and_hlsl() {
     });
 }
 
-/// What is wrong with the data that `stage` declares under `plan`, held against what its kernels read and write: nothing that is bound is
-/// undeclared, and nothing is read that neither the stage was given nor an earlier kernel of it has written.
+/// Checks the declared data of `stage` against the bindings of its kernels: all bound data are declared, and
+/// all reads are of declared inputs or of data that an earlier kernel of the stage has written.
 fn check_data(stage: Stage, plan: &Plan, kernels: &[Kernel]) -> Result<HashSet<Data>, String> {
     let reads: HashSet<_> = stage.reads(plan).collect();
     let writes: HashSet<_> = stage.writes().collect();
@@ -300,7 +300,7 @@ fn check_data(stage: Stage, plan: &Plan, kernels: &[Kernel]) -> Result<HashSet<D
             }
             bound.extend(all);
         }
-        // Output beside an array takes its place.
+        // The next guide replaces the guide.
         let replaced = |data: &Data| match *data {
             Data::NextGuide(z) => vec![Data::Guide(z)],
             _ => Vec::new(),
@@ -311,8 +311,8 @@ fn check_data(stage: Stage, plan: &Plan, kernels: &[Kernel]) -> Result<HashSet<D
     Ok(bound)
 }
 
-/// Every array that a kernel binds is data that the descriptor of its stage names, with the access that it declares, and every datum
-/// that it names is bound in some plan.
+/// Kernels bind only data that the descriptor of their stage declares, with the declared access, and all
+/// declared data are bound in some plan.
 #[test]
 fn stages_declare_what_their_kernels_bind() {
     let (mut seen, mut unbound, mut bound) = (HashSet::new(), HashSet::new(), HashSet::new());
@@ -334,15 +334,15 @@ fn stages_declare_what_their_kernels_bind() {
     assert!(unbound.is_empty(), "declared, and bound by no kernel: {unbound:?}");
 }
 
-/// Control: data that a stage does not name, and reads of what nobody has written, are noticed.
+/// Control: undeclared data, and reads of data that are not written, are detected.
 #[test]
-fn undeclared_data_are_noticed() {
+fn control_undeclared_data_are_found() {
     let plan = &PLANS[0];
     let of = |stage: Stage| kernels(stage, plan);
     check_data(Stage::Support, plan, &of(Stage::Support)).unwrap();
-    // Votes read labels, which planes do not name, and need sums.
+    // Votes read labels, which planes do not declare, and need sums.
     assert!(check_data(Stage::FarPlane, plan, &of(Stage::VoteFill)).is_err());
-    // The second kernel reads what the first one has written.
+    // The second kernel reads data that the first one writes.
     let check = |kernels: &[Kernel]| check_data(Stage::Fill, plan, kernels);
     let fill = of(Stage::Fill);
     check(&fill).unwrap();
@@ -354,14 +354,15 @@ fn steps_of(plan: &Plan) -> Vec<Step> {
     Program::new(&Tiles::in_one_piece(plan)).unwrap().steps
 }
 
-/// Whether each datum that `steps` read has been written before, or was there from the start.
+/// Checks that all data that `steps` read are written before, or exist from the start.
 fn check_order(plan: &Plan, steps: &[Step]) -> Result<(), String> {
     let at_start = |data: &Data| data.array(plan).start != Start::Anything;
     let mut written: HashSet<_> = Data::all(plan).into_iter().filter(at_start).collect();
-    // Windows hold all labels until they are found.
+    // Windows have all labels until they are computed.
     written.extend((0..plan.levels.len()).map(Data::Windows));
     for stage in steps.iter().filter_map(Step::stage) {
-        // Without messages of its factors, a level needs no graph; and a check that is off looks at no right view.
+        // A level whose factors send no messages needs no graph, and without a left-right check the right labels
+        // are not read.
         let counts = |data: &Data| match *data {
             Data::Members(z) | Data::Incoming(z) => plan.floods(z),
             Data::Map(Map::RightLabel) => plan.method.refinement.left_right_check != LeftRightCheck::Off,
@@ -381,7 +382,7 @@ fn data_are_written_before_they_are_read() {
         check_order(plan, &steps_of(plan))
             .unwrap_or_else(|error| panic!("{error}: {:?}", plan.method));
     }
-    // Control: without the stage that finds the labels, those that read them are noticed.
+    // Control: without the stage that computes the labels, reads of them are detected.
     let plan = &PLANS[0];
     let steps: Vec<_> = steps_of(plan);
     let without = |missing: Stage| {
