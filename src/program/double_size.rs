@@ -26,7 +26,7 @@ mod tests {
     use crate::program::samples;
 
     #[test]
-    fn the_doubled_pair_follows_with_frames_of_its_own() {
+    fn the_doubled_pair_follows_in_separate_frames() {
         let plan = samples::plan(LeftRightCheck::RightView);
         let own = samples::plain(&plan);
         let program = follow(own.clone(), own.clone());

@@ -12,7 +12,7 @@ pub fn join(plan: &Plan, shared: usize, steps: Vec<Step>) -> Vec<Step> {
     for step in steps {
         if let (Some(Step::Run(last)), Step::Run(run)) = (all.last_mut(), &step) {
             let goes_on = *run == Run::from(last.stage.coarser(last.levels)) && run.stage != last.stage;
-            if goes_on && last.part.is_none() && may_join(last.stage) {
+            if goes_on && last.band.is_none() && may_join(last.stage) {
                 last.levels += 1;
                 continue;
             }
@@ -38,7 +38,7 @@ mod tests {
     }
 
     #[test]
-    fn levels_that_share_go_together_and_no_others() {
+    fn only_levels_that_share_buffers_are_joined() {
         let plan = samples::plan(LeftRightCheck::RightView);
         let steps = schedule::estimate(&plan);
         let mut fewest = steps.len();

@@ -43,7 +43,7 @@ pub enum View {
 
 /// A band of rows of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Part {
+pub struct RowBand {
     /// Rows of the stage's level.
     pub rows: Range<usize>,
     /// The messages that exist when the first rows run.
@@ -69,12 +69,12 @@ pub struct Run {
     /// Number of levels that it runs at, from that level on.
     pub levels: usize,
     /// A band of rows of its level; `None` for all rows.
-    pub part: Option<Part>,
+    pub band: Option<RowBand>,
 }
 
 impl From<Stage> for Run {
     fn from(stage: Stage) -> Self {
-        Self { stage, levels: 1, part: None }
+        Self { stage, levels: 1, band: None }
     }
 }
 
@@ -90,7 +90,7 @@ impl Run {
     pub fn work(&self, plan: &Plan) -> f64 {
         let all: f64 = self.stages().map(|stage| stage.work(plan)).sum();
         let height = plan.levels[self.stage.level().unwrap_or(0)].height;
-        all * self.part.as_ref().map_or(1.0, |part| part.rows.len() as f64 / height as f64)
+        all * self.band.as_ref().map_or(1.0, |band| band.rows.len() as f64 / height as f64)
     }
 }
 

@@ -94,7 +94,7 @@ mod tests {
 
     /// Control: costs that are read after messages were sent do not share memory.
     #[test]
-    fn what_lives_at_the_same_time_does_not_share() {
+    fn control_data_needed_at_the_same_time_do_not_share() {
         let mut plan = Plan::new(80, 60, DisparityRange::new(0, 20).unwrap(), &Method::default()).unwrap();
         for late in [Stage::Evidence(1), Stage::Pyramid(2)] {
             let mut steps = schedule::steps(&plan);

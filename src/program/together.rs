@@ -6,7 +6,7 @@
 //! needed. The results are the same as stage by stage.
 
 use super::schedule::{self, split};
-use super::{Part, Run, Sent, Step};
+use super::{RowBand, Run, Sent, Step};
 use crate::plan::Plan;
 use crate::stage::{Data, Stage, Volume};
 use std::ops::Range;
@@ -27,9 +27,9 @@ pub fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
     let Some((streamed, range, wavefront)) = going_together(plan, &steps) else { return steps };
     let mut all = steps[..range.start].to_vec();
     let sent = sent(&steps[..range.start], &wavefront.stages);
-    all.extend(wavefront.parts().map(|(i, rows)| {
-        let part = Some(Part { rows, sent: sent[i] });
-        Step::Run(Run { stage: wavefront.stages[i], levels: 1, part })
+    all.extend(wavefront.bands().map(|(i, rows)| {
+        let band = Some(RowBand { rows, sent: sent[i] });
+        Step::Run(Run { stage: wavefront.stages[i], levels: 1, band })
     }));
     let markers = steps[range.clone()].iter().filter(|step| step.stage().is_none());
     all.extend(markers.cloned());
@@ -128,13 +128,13 @@ impl Wavefront {
     }
 
     /// In order, the index of a stage and the rows of its level that it computes next.
-    fn parts(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
+    fn bands(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
         let last = self.lags.last().copied().unwrap_or(0);
         let steps = (self.heights[0] + last).div_ceil(self.band);
         let order = (0..steps).flat_map(|step| (0..self.stages.len()).map(move |i| (step, i)));
         order
             .map(|(step, i)| (i, self.front(step, i)..self.front(step + 1, i)))
-            .filter(|part| !part.1.is_empty())
+            .filter(|band| !band.1.is_empty())
     }
 
     /// Rows that stage `i` has computed after `steps` steps.
@@ -175,7 +175,7 @@ mod tests {
         let (stages, height) = (&wavefront.stages[..], wavefront.heights[0]);
         // Rows of level 0 that each stage has computed, from the top.
         let mut done = vec![0; stages.len()];
-        for (i, rows) in wavefront.parts() {
+        for (i, rows) in wavefront.bands() {
             for row in rows {
                 let [own, around] = seen(stages[i], row, height);
                 if own.start != done[i] {
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn stages_find_what_they_read_and_spoil_nothing() {
+    fn stages_read_complete_rows_and_overwrite_no_needed_ones() {
         for height in [1, 2, 7, 16, 61, 300, 401] {
             let range = DisparityRange::new(0, 63).unwrap();
             let plan = Plan::new(40, height, range, &Method::default()).unwrap();
@@ -222,7 +222,7 @@ mod tests {
     fn fits_ring(wavefront: &Wavefront, part: usize, count: usize) -> bool {
         let (stages, height) = (&wavefront.stages[..], wavefront.heights[0]);
         let mut there = vec![0; count];
-        wavefront.parts().all(|(i, rows)| {
+        wavefront.bands().all(|(i, rows)| {
             rows.into_iter().all(|row| {
                 let [own, _] = seen(stages[i], row, height);
                 if i == 0 {
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn rings_keep_what_is_needed() {
+    fn rings_keep_all_needed_parts() {
         for height in [61, 300, 401] {
             let range = DisparityRange::new(0, 63).unwrap();
             let plan = Plan::new(40, height, range, &Method::default()).unwrap();
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn stages_that_look_at_the_whole_image_are_declined() {
+    fn stages_on_the_whole_image_prevent_a_wavefront() {
         let plan = Plan::new(40, 400, DisparityRange::new(0, 63).unwrap(), &Method::default()).unwrap();
         let (mut held, steps) = (plan.clone(), schedule::estimate(&plan));
         assert!(pass(&mut held, steps.clone()).len() > steps.len() && held.held < plan.held);
@@ -264,29 +264,29 @@ mod tests {
 
     /// Every row of every stage runs once, with the messages that existed when the stage started.
     #[test]
-    fn parts_are_the_stages() {
+    fn bands_cover_every_stage() {
         let plan = Plan::new(40, 400, DisparityRange::new(0, 63).unwrap(), &Method::default()).unwrap();
         let steps = schedule::estimate(&plan);
-        let parts = pass(&mut plan.clone(), steps.clone());
+        let bands = pass(&mut plan.clone(), steps.clone());
         let rows = |steps: &[Step]| {
             let mut rows = std::collections::BTreeMap::new();
             for step in steps {
                 let Step::Run(run) = step else { continue };
                 for run in split(run.clone()) {
                     let height = plan.levels[run.stage.level().unwrap_or(0)].height;
-                    let count = run.part.as_ref().map_or(height, |part| part.rows.len());
+                    let count = run.band.as_ref().map_or(height, |band| band.rows.len());
                     *rows.entry(run.stage).or_insert(0) += count;
                 }
             }
             rows
         };
-        assert_eq!(rows(&parts), rows(&steps));
+        assert_eq!(rows(&bands), rows(&steps));
         let sent = |stage: Stage, first: bool| {
-            let mut parts = parts.iter().filter_map(|step| match step {
-                Step::Run(Run { stage: s, part: Some(part), .. }) if *s == stage => Some(part.sent),
+            let mut bands = bands.iter().filter_map(|step| match step {
+                Step::Run(Run { stage: s, band: Some(band), .. }) if *s == stage => Some(band.sent),
                 _ => None,
             });
-            if first { parts.next().unwrap() } else { parts.next_back().unwrap() }
+            if first { bands.next().unwrap() } else { bands.next_back().unwrap() }
         };
         assert!(!sent(Stage::Dependency(0), true).dependency);
         assert!(sent(Stage::Belief(1), true).dependency && sent(Stage::Belief(1), true).below);

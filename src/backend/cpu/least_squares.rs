@@ -183,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quotients_are_those_of_integers() {
+    fn quotients_equal_integer_division() {
         let few =
             [1, 2, 3, 5, 7, 10, 127, 641, 59_055, 65_536, 6_700_417, 13_322_500, i32::MAX - 1, i32::MAX];
         let many = (1..3000).map(|i| 1 + i * i * 37).chain(few);

@@ -22,7 +22,7 @@ use crate::maps::Maps;
 use crate::memory;
 use crate::pause::Pause;
 use crate::plan::{Plan, VolumeWidth};
-use crate::program::{Part, Program, Run, sharing, together};
+use crate::program::{Program, RowBand, Run, sharing, together};
 use crate::stage::{Data, MapSet};
 use crate::threads::prelude::current_num_threads;
 use std::future::ready;
@@ -110,14 +110,14 @@ impl Backend for Cpu {
     fn perform(&mut self, run: &Run) -> Result<()> {
         for stage in run.stages() {
             let start = Instant::now();
-            on_volumes!(self, v => match &run.part {
+            on_volumes!(self, v => match &run.band {
                 None => v.run(stage),
-                Some(Part { rows, sent }) => {
+                Some(RowBand { rows, sent }) => {
                     v.begin(stage);
                     v.run_rows(stage, *sent, rows.clone());
                 }
             });
-            let begins = run.part.as_ref().is_none_or(|part| part.rows.start == 0);
+            let begins = run.band.as_ref().is_none_or(|band| band.rows.start == 0);
             let Some(times) = &mut self.times else { continue };
             match times.iter_mut().rev().find(|time| time.0 == stage && !begins) {
                 Some(time) => time.1 += start.elapsed(),

@@ -222,7 +222,7 @@ fn places(lengths: &[usize], held: usize, height: usize) -> Vec<usize> {
 
 /// The cells of a pixel, aligned to the window of another pixel.
 #[derive(Clone, Copy)]
-pub(super) struct Seen<'a, U> {
+pub(super) struct AlignedCells<'a, U> {
     cells: &'a [U],
     start: usize,
     /// First label of the other window minus first label of the pixel's own.
@@ -231,7 +231,7 @@ pub(super) struct Seen<'a, U> {
     labels: isize,
 }
 
-impl<'a, U: Units> Seen<'a, U> {
+impl<'a, U: Units> AlignedCells<'a, U> {
     /// The cells from `start` on in `cells`, of a pixel with `window`, one of `windows`; labels count from
     /// `first`.
     #[inline(always)]

@@ -155,7 +155,7 @@ impl Gpu {
     ) -> Result<Arc<[Command]>> {
         let level = run.stage.level().unwrap_or(0);
         self.recorded_at(level, plan, buffers, endings, |recorder| {
-            recorder.only = run.part.as_ref().map(|part| part.rows.start as u32..part.rows.end as u32);
+            recorder.only = run.band.as_ref().map(|band| band.rows.start as u32..band.rows.end as u32);
             match record_levels(run.stage) {
                 Some(record) if run.levels > 1 => record(recorder, level..level + run.levels),
                 _ => record(recorder, run.stage),

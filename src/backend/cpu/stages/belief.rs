@@ -3,7 +3,7 @@
 use super::dependency::{REACH, touch};
 use crate::backend::cpu::units::{Blocks, Units, block, block_mut, each_lane, padding};
 use crate::backend::cpu::volumes::{Level, Volumes};
-use crate::backend::cpu::windows::{Seen, Window, Windows};
+use crate::backend::cpu::windows::{AlignedCells, Window, Windows};
 use crate::graph::{Incoming, LevelGraph};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan};
 use crate::program::Sent;
@@ -161,7 +161,7 @@ impl<U: Units> Sum<'_, U> {
         let Summands { windows, tau, .. } = self.summands;
         let mut sum: [U; LABEL_BLOCK] = self.own_terms(at);
         for (window, &start) in factors.zip(self.messages) {
-            let seen = Seen::new(windows, window, self.dependency, start, self.window.first());
+            let seen = AlignedCells::new(windows, window, self.dependency, start, self.window.first());
             let (m, outside) = seen.block(at);
             sum = plus(sum, &each_lane(|i| m[i] & !outside[i] | *tau & outside[i]));
         }

@@ -8,7 +8,7 @@ use crate::backend::cpu::units::{
     Least, Units, block, block_mut, bounds, cut_block, each_lane, keep_least, smallest, truncate,
 };
 use crate::backend::cpu::volumes::{Level, Volumes};
-use crate::backend::cpu::windows::{Seen, Window, Windows};
+use crate::backend::cpu::windows::{AlignedCells, Window, Windows};
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Truncation, TruncationRule};
 use crate::program::Sent;
@@ -156,8 +156,8 @@ impl<'a, U: Units> Near<'a, U> {
 
     /// The beliefs of a pixel, with labels counted from `first`.
     #[inline(always)]
-    fn seen(&self, (window, beliefs): (Window, &'a [U]), first: usize) -> Seen<'a, U> {
-        Seen::new(self.windows, window, beliefs, window.start(), first)
+    fn seen(&self, (window, beliefs): (Window, &'a [U]), first: usize) -> AlignedCells<'a, U> {
+        AlignedCells::new(self.windows, window, beliefs, window.start(), first)
     }
 }
 
@@ -174,7 +174,7 @@ type Block<U> = [U; LABEL_BLOCK];
 
 /// A factor with three members, where each sum has two terms.
 struct Three<'a, U> {
-    members: [Seen<'a, U>; 3],
+    members: [AlignedCells<'a, U>; 3],
     stride: usize,
 }
 
@@ -288,7 +288,7 @@ fn any<'a, U: Units>(
     cut: Truncation,
     step: Option<u16>,
     stride: usize,
-    member: impl Fn(usize) -> Seen<'a, U>,
+    member: impl Fn(usize) -> AlignedCells<'a, U>,
     messages: &mut [U],
     scratch: &mut Scratch<U>,
 ) {

@@ -42,27 +42,27 @@ pub(super) fn smooth(
 ) {
     let MapSet { disparity, validity: flags, .. } = maps;
     let width = disparity.width();
-    let seen = Seen::new(weights, guide, disparity, flags);
+    let input = MedianInput::new(weights, guide, disparity, flags);
     let disparity = disparity.data_mut().par_chunks_mut(width).enumerate();
-    disparity.for_each_init(Window::default, |window, (y, row)| {
+    disparity.for_each_init(MedianWindow::default, |window, (y, row)| {
         window.limits = limits;
-        window.open(weights, &seen, y);
+        window.open(weights, &input, y);
         window.touched.clear();
         window.touched.extend(flags.row(y).iter().map(|&f| mask(touched(f))));
         window.touched.resize(width + LANES, 0);
-        median_row(window, &seen, row);
+        median_row(window, &input, row);
     });
 }
 
 /// Computes the touched pixels of the current row of `window`.
 #[pulp::with_simd(median_row = crate::vectors::widest())]
 #[inline(always)]
-fn median_row_on<'a, S: pulp::Simd>(_: S, window: &'a mut Window, seen: &'a Seen, row: &'a mut [i32]) {
+fn median_row_on<'a, S: pulp::Simd>(_: S, window: &'a mut MedianWindow, input: &'a MedianInput, row: &'a mut [i32]) {
     let mut x = 0;
     while let Some(skipped) = window.touched[x..].iter().position(|&touched| touched > 0) {
         x += skipped;
         let touched: [u8; LANES] = *block(&window.touched, x);
-        let results = window.results(seen, x, &touched);
+        let results = window.results(input, x, &touched);
         for ((out, result), _) in row[x..].iter_mut().zip(results).zip(touched).filter(|each| each.1 > 0) {
             *out = result;
         }
@@ -71,7 +71,7 @@ fn median_row_on<'a, S: pulp::Simd>(_: S, window: &'a mut Window, seen: &'a Seen
 }
 
 /// The input of the windows, with unknown pixels beyond the ends of rows.
-struct Seen {
+struct MedianInput {
     /// Number of unknown pixels before each row.
     margin: usize,
     pitch: usize,
@@ -82,7 +82,7 @@ struct Seen {
     values: Vec<i32>,
 }
 
-impl Seen {
+impl MedianInput {
     fn new(weights: &MedianWeights, guide: &Image, disparity: &Plane<i32>, flags: &Plane<u8>) -> Self {
         let (width, height) = disparity.size();
         let margin = weights.radius << weights.step_bits[0];
@@ -127,7 +127,7 @@ const COARSE_BITS: u32 = 8;
 
 /// The windows of [`LANES`] adjacent pixels.
 #[derive(Default)]
-struct Window {
+struct MedianWindow {
     /// Index of the row of the centres in the input.
     centre: usize,
     radius: usize,
@@ -152,15 +152,15 @@ struct Window {
     found: [i8; LANES],
 }
 
-impl Window {
+impl MedianWindow {
     /// Moves to row `y`; rows outside the image are left out.
-    fn open(&mut self, weights: &MedianWeights, seen: &Seen, y: usize) {
+    fn open(&mut self, weights: &MedianWeights, input: &MedianInput, y: usize) {
         let [column_step, row_step] = weights.step_bits.map(|bits| 1 << bits);
         // The rows of the window, every second one.
         let (apart, reach) = (row_step << WINDOW_ROW_BITS, weights.radius >> WINDOW_ROW_BITS);
         let first = y - reach.min(y / apart) * apart;
         self.offsets.clear();
-        for ny in (first..(y + reach * apart + 1).min(seen.height)).step_by(apart) {
+        for ny in (first..(y + reach * apart + 1).min(input.height)).step_by(apart) {
             for (column, &taken) in weights.space_row(ny.abs_diff(y) / row_step).iter().enumerate() {
                 let steps = [
                     column as i16 - weights.radius as i16,
@@ -170,11 +170,11 @@ impl Window {
                     continue;
                 }
                 let near = MEDIAN_WEIGHT.saturating_sub(taken);
-                self.offsets.push((ny * seen.pitch + column * column_step, steps, near));
+                self.offsets.push((ny * input.pitch + column * column_step, steps, near));
             }
         }
         self.radius = weights.radius;
-        (self.centre, self.doublings) = (y * seen.pitch + seen.margin, weights.doublings);
+        (self.centre, self.doublings) = (y * input.pitch + input.margin, weights.doublings);
         let most = self.offsets.len().next_multiple_of(2);
         self.weighed.resize(most, Weighed::default());
         self.values.resize(most, Values::default());
@@ -183,7 +183,7 @@ impl Window {
 
     /// The results for the touched pixels from column `x` on: medians or planes.
     #[inline(always)]
-    fn results(&mut self, seen: &Seen, x: usize, touched: &[u8; LANES]) -> [i32; LANES] {
+    fn results(&mut self, input: &MedianInput, x: usize, touched: &[u8; LANES]) -> [i32; LANES] {
         // Round to the nearest step for planes, else down.
         let (bits, half) = if self.limits.is_some() {
             (PLANE_START_BITS, 1 << (PLANE_START_BITS - 1))
@@ -191,11 +191,11 @@ impl Window {
             (COARSE_BITS, 0)
         };
         // Start at the own value of each lane, in whole steps.
-        let own: &[i32; LANES] = block(&seen.values, self.centre + x);
+        let own: &[i32; LANES] = block(&input.values, self.centre + x);
         let mut base: [i32; LANES] = each_lane(|i| ((own[i] + i32::from(half)) >> bits) << bits);
-        self.weigh(seen, x, touched);
+        self.weigh(input, x, touched);
         let found = loop {
-            self.load(seen, &base);
+            self.load(input, &base);
             self.find(&[-half; LANES], bits);
             let found: [i16; LANES] = each_lane(|i| i16::from(self.found[i]) << bits);
             // At the ends of the range of bytes, the search continues from there.
@@ -227,10 +227,10 @@ impl Window {
 
     /// Finds the places with weight for any of the `touched` pixels.
     #[inline(always)]
-    fn weigh(&mut self, seen: &Seen, x: usize, touched: &[u8; LANES]) {
-        let cells = seen.known.len();
-        let known = &seen.known[..cells];
-        let [red, green, blue] = seen.guides.each_ref().map(|guide| &guide[..cells]);
+    fn weigh(&mut self, input: &MedianInput, x: usize, touched: &[u8; LANES]) {
+        let cells = input.known.len();
+        let known = &input.known[..cells];
+        let [red, green, blue] = input.guides.each_ref().map(|guide| &guide[..cells]);
         let centres: [[u8; LANES]; 3] = [red, green, blue].map(|guide| *block(guide, self.centre + x));
         let doublings = self.doublings;
         // The difference that takes all weight once doubled.
@@ -256,13 +256,13 @@ impl Window {
 
     /// Loads the values of the weighted places, relative to `base`, and sums the weights.
     #[inline(always)]
-    fn load(&mut self, seen: &Seen, base: &[i32; LANES]) {
+    fn load(&mut self, input: &MedianInput, base: &[i32; LANES]) {
         let mut total = [0u16; LANES];
         for (Values(values), Weighed { at, weights, .. }) in
             self.values.iter_mut().zip(&self.weighed[..self.count])
         {
             total = each_lane(|i| total[i].saturating_add(weights[i].into()));
-            let all: &[i32; LANES] = block(&seen.values, *at);
+            let all: &[i32; LANES] = block(&input.values, *at);
             *values = each_lane(|i| (all[i] - base[i]).clamp(i16::MIN.into(), i16::MAX.into()) as i16);
         }
         self.need = each_lane(|i| total[i].div_ceil(2));

@@ -315,7 +315,7 @@ mod tests {
     use crate::stage::Optimum;
 
     #[test]
-    fn bands_change_nothing() {
+    fn bands_do_not_change_votes() {
         let (width, height) = (37, 61);
         let range = DisparityRange::new(0, 11).unwrap();
         let plan = Plan::new(width, height, range, &Method::default()).unwrap();
