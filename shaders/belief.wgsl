@@ -69,8 +69,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         factors &= select(vec2(0u, factors.y - 1u), vec2(factors.x - 1u, factors.y), is_low);
         let fx = x + code % WINDOW - RADIUS;
         let fy = y + code / WINDOW - RADIUS - top;
-        // The pixel is at the opposite offset from the factor; if no slot has its code, it is the own pixel, slot
-        // 0.
+        // The pixel is at the opposite offset from the factor. Without its code in a slot, it is slot 0, the own pixel.
         let opposite = vec4(2u * CENTRE - code);
         var slots = vec4<u32>();
         let words = params.level.members_at + fy * params.level.member_pitch + fx * MEMBER_WORDS;

@@ -290,8 +290,7 @@ fn rise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     set_moments(BACK, vec2(x, first), carry);
 }
 
-// Moments from above, by bands of rows from the first to the last, and the planes. One invocation per column of
-// patches.
+// Moments from above, by bands from the first to the last, and planes. One invocation per column of patches.
 @compute @workgroup_size(GROUP)
 fn sink(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let x = place(group, lane).x;

@@ -1,5 +1,4 @@
-//! Registers, spills and occupancy of every variant of every shader on Radeons, from Mesa's compiler: see
-//! `scripts/isa`.
+//! Registers, spills and occupancy of all variants of all shaders on Radeons, from Mesa: see `scripts/isa`.
 //!
 //! Mesa's driver RADV can emulate any Radeon: it compiles for it but cannot run anything. wgpu runs something
 //! at start-up, and does not expose statistics of shaders, so this program calls Vulkan directly.
@@ -175,8 +174,7 @@ fn run(names: &[String]) -> Result<(), String> {
     Err(faults.join("\n"))
 }
 
-/// The name of a kernel, shared by its variants, except that different sizes of arrays per slot have
-/// different names.
+/// The name of a kernel, shared by variants with the same number of slots.
 fn name(kernel: &Shader) -> String {
     let entry = match kernel.entry {
         "main" => String::new(),
@@ -281,8 +279,7 @@ impl Radeon {
             })
             .collect();
         let entry = CString::new(entry).map_err(|e| e.to_string())?;
-        // SAFETY: naga emits valid SPIR-V, `bindings` has all of its bindings, and everything lives as long
-        // as the calls.
+        // SAFETY: naga emits valid SPIR-V, `bindings` has all its bindings, and all arguments outlive the calls.
         let statistics = unsafe { self.statistics(&bindings, &words, &entry) }.map_err(|e| e.to_string())?;
         let figure = |name: &str| {
             let found = statistics.get(name).copied();

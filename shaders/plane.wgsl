@@ -1,5 +1,4 @@
-// The value at every pixel of a plane fitted to the disparities around it, starting from the weighted median. One invocation per
-// pixel.
+// The value at each pixel of a plane fitted around it, from the weighted median on. One invocation per pixel.
 
 #import band weighted_median
 

@@ -1,5 +1,4 @@
-// The label map of the right view, from the beliefs of the left view in the given columns. One invocation per
-// right pixel.
+// Labels of the right view, from beliefs of the left view in the given columns. One invocation per right pixel.
 
 #import band volume messages
 

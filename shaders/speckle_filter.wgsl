@@ -143,8 +143,7 @@ fn flatten(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     let start = id.y * params.level.pixel_pitch + id.x;
     let parent = atomicLoad(&parents[start]);
     if parent != NOWHERE {
-        // Roots do not change meanwhile, so other invocations reach the root through the old or the new
-        // pointer.
+        // Roots stay roots, so other invocations reach the root by the old or the new pointer.
         atomicStore(&parents[start], root(parent));
     }
 }

@@ -204,8 +204,7 @@ fn step_weight(x: u32, a: u32, b: u32) -> u32 {
     return vote_weights[COLOUR_DIFFERENCES + difference(one, other)];
 }
 
-// Sums along columns, for half-size pixels whose votes are needed. One invocation per half-size pixel and
-// label.
+// Sums along columns, where votes are needed. One invocation per half-size pixel and label.
 @compute @workgroup_size(GROUP)
 fn sum_columns(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);

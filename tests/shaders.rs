@@ -361,8 +361,7 @@ fn check_order(plan: &Plan, steps: &[Step]) -> Result<(), String> {
     // Windows have all labels until they are computed.
     written.extend((0..plan.levels.len()).map(Data::Windows));
     for stage in steps.iter().filter_map(Step::stage) {
-        // A level whose factors send no messages needs no graph, and without a left-right check the right labels
-        // are not read.
+        // Without messages, a level needs no graph; without a left-right check, right labels are not read.
         let counts = |data: &Data| match *data {
             Data::Members(z) | Data::Incoming(z) => plan.floods(z),
             Data::Map(Map::RightLabel) => plan.method.refinement.left_right_check != LeftRightCheck::Off,
@@ -379,8 +378,7 @@ fn check_order(plan: &Plan, steps: &[Step]) -> Result<(), String> {
 #[test]
 fn data_are_written_before_they_are_read() {
     for plan in PLANS.iter() {
-        check_order(plan, &steps_of(plan))
-            .unwrap_or_else(|error| panic!("{error}: {:?}", plan.method));
+        check_order(plan, &steps_of(plan)).unwrap_or_else(|error| panic!("{error}: {:?}", plan.method));
     }
     // Control: without the stage that computes the labels, reads of them are detected.
     let plan = &PLANS[0];

@@ -39,8 +39,7 @@ struct Band {
     dependency_at: u32,
 }
 
-// Column and row of an invocation. Rows follow each other in the workgroups, which wrap at the dispatch limit
-// of a dimension.
+// Column and row of an invocation. Rows follow each other in the workgroups, which wrap at the dispatch limit.
 fn place(group: vec3<u32>, lane: u32) -> vec2<u32> {
     let linear = group.x + group.y * params.band.grid - params.band.first_group;
     let row = linear / params.band.row_groups;

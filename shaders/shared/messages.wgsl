@@ -2,8 +2,7 @@
 
 #import volume
 
-// For messages and beliefs: labels per word, words per quad of labels, and the largest value, used as
-// infinity.
+// For messages and beliefs: labels per word, words per quad of labels, and the largest value (infinity).
 const PER_WORD: u32 = 32u / BITS;
 const QUAD_WORDS: u32 = 4u / PER_WORD;
 const MOST: u32 = 0xffffffffu >> (32u - BITS);

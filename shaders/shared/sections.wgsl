@@ -1,5 +1,4 @@
-// Stages that may process several levels in one dispatch: workgroups are divided into sections, one per
-// level.
+// Stages that may process several levels in one dispatch: the workgroups have a section for each level.
 
 @group(0) @binding(0) var<uniform> sections: array<Params, SECTIONS>;
 // The parameters of the section that this workgroup belongs to.

@@ -95,8 +95,7 @@ fn in_steps(at: u32, bits: u32) -> i32 {
     return (disparity[at] + i32((1u << bits) >> 1u)) >> bits;
 }
 
-// The median in window `w` in steps of 2^`bits`; the unchanged disparity for pixels that the median does not
-// change.
+// The median in window `w` in steps of 2^`bits`, or the old disparity if the median does not change the pixel.
 fn median(w: Window, bits: u32) -> i32 {
     let pitch = params.level.pixel_pitch;
     var low = disparity[w.here];

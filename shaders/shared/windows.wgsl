@@ -1,5 +1,4 @@
-// The labels that each pixel has. All others have infinite beliefs from the moment the level joins, so stages
-// skip them.
+// The labels that each pixel has. All others have infinite beliefs once the level has joined; stages skip them.
 
 #import volume
 

@@ -9,8 +9,7 @@ use crate::stage::{Map, Volume};
 /// [`crate::Error::Device`] if the device fails.
 #[allow(clippy::missing_errors_doc, reason = "said once, above")]
 pub trait Probe {
-    /// The values of `volume`. At labels outside the window of their pixel, beliefs are infinity and messages
-    /// the truncation.
+    /// The values of `volume`. Outside the pixel's window, beliefs are infinity and messages the truncation.
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>>;
 
     /// Replaces the values of `volume`.

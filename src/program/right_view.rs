@@ -12,8 +12,7 @@ pub fn stages(plan: &Plan) -> Vec<Step> {
     [&[Stage::SwapViews], between_labels].concat().into_iter().map(Step::of).collect()
 }
 
-/// Adds the right view to `steps`, after the request for the left maps: its sub-pixel disparities and the map
-/// stages.
+/// Adds the right view to `steps`, after the request for the left maps: sub-pixel disparities, map stages.
 #[must_use]
 pub fn follow(plan: &Plan, mut steps: Vec<Step>) -> Vec<Step> {
     let is_of_maps = |step: &&Step| step.stage().is_some_and(Stage::is_of_maps);

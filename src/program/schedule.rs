@@ -99,8 +99,7 @@ pub fn post_processing(method: &Method) -> Vec<Step> {
     taken.copied().map(Step::of).collect()
 }
 
-/// Splits a flooding at one level into messages and beliefs, for backends that do not compute both in one
-/// sweep.
+/// Splits a flooding at one level into messages and beliefs, for backends that compute them separately.
 #[must_use]
 pub fn split(run: Run) -> Vec<Run> {
     match run.stage {

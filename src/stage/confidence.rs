@@ -1,5 +1,4 @@
-//! The [`Confidence`](crate::backend::Map::Confidence) of each pixel: the lead of its label over the
-//! runner-up.
+//! The [`Confidence`](crate::backend::Map::Confidence) of a pixel: the lead of its label over the runner-up.
 //!
 //! ```text
 //! confidence = min(2 (RunnerUp - Best), 255)         for valid pixels; 255 without a runner-up

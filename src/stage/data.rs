@@ -620,6 +620,7 @@ impl Data {
         Self::all(plan).into_iter().filter(is_meant).collect()
     }
 
+    /// The volume, if this is one.
     #[must_use]
     pub fn volume(self) -> Option<Volume> {
         match self {

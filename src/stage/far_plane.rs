@@ -1,9 +1,9 @@
 //! Extends planes of measured pixels, over any distance, to filled pixels that they fit and to doubtful
 //! measured ones: walls and roads continue where nothing can be matched.
 //!
-//! The constants are in [`patches`](crate::plan::patches). Patch (X, Y) covers the pixels (4 X, 4 Y) to (4 X
-//! + 3, 4 Y + 3) inside the image. `>>` rounds down, / towards 0, and \[f\] is the sum of f over the pixels
-//! of a patch. Steps 1 to 5 run twice; the second time, the planes of the first exist.
+//! The constants are in [`patches`](crate::plan::patches). Patch (X, Y) covers the pixels (4 X, 4 Y) to
+//! (4 X + 3, 4 Y + 3) inside the image. `>>` rounds down, / towards 0, and \[f\] is the sum of f over the
+//! pixels of a patch. Steps 1 to 5 run twice; the second time, the planes of the first exist.
 //!
 //! 1. The weight w of a pixel is its [`Confidence`](crate::backend::Map::Confidence), and 0 with a flag of
 //!    [`INVALID`](crate::maps::flag::INVALID). Where a plane exists, with value Q at the pixel (step 5), it is
@@ -34,11 +34,11 @@
 //!    sum(i) = f(i) and b(i)
 //!    ```
 //!
-//!    *Carried* to the next patch, the place changes by 4 px against the step, within `PATCH_REACH`, and the weight becomes (weight
-//!    share) >> 8. The share is the entry of [`patch_weights`](crate::weights::patch_weights) for the difference of the two patches,
+//!    *Carried* to the next patch, the place changes by 4 px against the step, within `PATCH_REACH`, and the weight becomes
+//!    (weight share) >> 8. The share is the entry of [`patch_weights`](crate::weights::patch_weights) for the difference of the two patches,
 //!    or the last entry beyond it. The difference is the sum of the differences of their mean colours ([like those of half-size
-//!    pixels](super::vote_fill)) plus, where both have weight of their own, max(|difference of their disparities| - `PATCH_STEP`, 0)
-//!    >> `PATCH_STEP_BITS`.
+//!    pixels](super::vote_fill)) plus, where both have weight of their own,
+//!    max(|difference of their disparities| - `PATCH_STEP`, 0) >> `PATCH_STEP_BITS`.
 //!
 //!    A *and* B is A if B has no weight, and B if A has none. Otherwise, with
 //!

@@ -7,8 +7,8 @@
 //! 1. The labels that it must hold, from `least` to `most`, by the first rule that applies (label k of a
 //!    level has the disparity low + k):
 //!    - If [the windows follow beliefs](crate::plan::Plan::windows_follow_beliefs), that is, levels join one
-//!      after another and this is not the coarsest: with c the disparity of each candidate of each pixel (X,
-//!      Y) of the next coarser level inside the image and at most [`WINDOW_REACH`](crate::plan::WINDOW_REACH)
+//!      after another and this is not the coarsest: with c the disparity of each candidate of each pixel
+//!      (X, Y) of the next coarser level inside the image and at most [`WINDOW_REACH`](crate::plan::WINDOW_REACH)
 //!      rows and columns from those of the run,
 //!
 //!      ```text

@@ -123,8 +123,7 @@ impl Plan {
         (corrected + zones) * self.levels[0].pixels() as u64
     }
 
-    /// Bytes of the half-size pair and its full size in whole blocks, if the pair is matched at half its
-    /// size.
+    /// Bytes of the half-size pair with its full size in whole blocks, if the pair is matched at half size.
     #[must_use]
     pub fn halving_bytes(&self) -> u64 {
         if self.full.is_some() { self.pair_bytes() } else { 0 }

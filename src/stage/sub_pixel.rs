@@ -1,9 +1,9 @@
 //! The disparity of every pixel of level 0 between the labels: the tip of a symmetric V through the matching
 //! costs around its label; the steeper side sets the slope of both.
 //!
-//! 1. With cost(q, k) the level's cost of label k at pixel q, and L the label of the pixel, of disparity low
-//!    + L (low is the smallest disparity), over the q of the neighbourhood of 5 columns and 3 rows that are
-//!    inside and whose label is at most 2 from L:
+//! 1. With cost(q, k) the level's cost of label k at pixel q, and L the label of the pixel, of disparity
+//!    low + L (low is the smallest disparity), over the q of the neighbourhood of 5 columns and 3 rows that
+//!    are inside and whose label is at most 2 from L:
 //!
 //!    ```text
 //!    a = sum of cost(q, L - 1)      b = sum of cost(q, L)      c = sum of cost(q, L + 1)

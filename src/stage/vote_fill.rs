@@ -20,7 +20,7 @@
 //!    ```text
 //!    v(k) = 2^VOTE_FRACTION_BITS (sum of these over its pixels)
 //!           min(|D - 256 (low + k)|, VOTE_MOST) >> VOTE_BITS      valid pixel of disparity D, in 1/256 px
-//!           VOTE_HIDING if k hides a label in the right view       neither valid nor masked
+//!           VOTE_HIDING if k hides a label in the right view      neither valid nor masked
 //!           0                                                     otherwise
 //!    ```
 //!
@@ -66,8 +66,8 @@
 //!                   + VOTE_AWAY (|X - (x >> 1)| + |Y - (y >> 1)|)
 //!    ```
 //!
-//! 7. A valid pixel that is not sure is outvoted if half-size pixel (x >> 1, y >> 1) has a vote with |V - D|
-//!    > `VOTE_OUTVOTES`. It takes this V, its flags become [`OUTVOTED`](crate::maps::flag::OUTVOTED) and
+//! 7. A valid pixel that is not sure is outvoted if half-size pixel (x >> 1, y >> 1) has a vote with
+//!    |V - D| > `VOTE_OUTVOTES`. It takes this V, its flags become [`OUTVOTED`](crate::maps::flag::OUTVOTED) and
 //!    [`FILLED`](crate::maps::flag::FILLED) only, and its confidence 0.
 
 use super::{Data, Descriptor, Map, maps};

@@ -1,5 +1,4 @@
-//! The label of each pixel of level 0, with its belief and the best belief of another surface. Beliefs are
-//! costs.
+//! The label of each pixel of level 0, its belief, and the best belief of another surface (beliefs are costs).
 //!
 //! Among the labels k that the pixel [has](super::label_window), with b(k) their beliefs:
 //!

@@ -91,8 +91,7 @@ fn planes_continue_where_nothing_is_measured() {
     }
 }
 
-/// Maps of a measured wall with a patch of 6 x 6 pixels that is 3 px off with this `confidence`, and a pixel that is slightly
-/// off.
+/// A measured wall; 6 x 6 pixels are 3 px off with this `confidence`, and one pixel is slightly off.
 fn patched(confidence: i32) -> Finest {
     let mut maps = Finest::zero(SIZE);
     maps.disparity = Plane::from_fn(SIZE.0, SIZE.1, slant);
@@ -164,8 +163,7 @@ fn control_one_wrong_pixel_is_found() {
     }
 }
 
-/// For the largest disparities and weights, all numbers fit in 32 bits. The twin uses 64 bits, so overflow
-/// would differ.
+/// The largest disparities and weights fit in 32 bits: the twin, with 64 bits, gives the same.
 #[test]
 fn the_largest_moments_fit() {
     let size = (600, 12);

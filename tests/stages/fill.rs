@@ -33,8 +33,7 @@ fn fill() {
     on_maps(Stage::Fill, 60, |_, _| (), input, |plan, _, maps| twin::fill::fill(plan, maps));
 }
 
-/// Smaller disparities that are nearer become larger ones that are nearer in a mirror, where disparities change
-/// sign.
+/// In a mirror, disparities change sign, so that the nearer ones are the larger instead of the smaller.
 #[test]
 fn fill_in_a_mirror() {
     let mut random = Random::new(8);

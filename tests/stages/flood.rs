@@ -25,8 +25,7 @@ fn flood() {
     });
 }
 
-/// On the CPU path every thread sweeps its own bands; beliefs near their borders must wait for their
-/// messages.
+/// Every thread of the CPU path sweeps its own bands; beliefs near borders must wait for their messages.
 #[test]
 fn sweeps_in_bands_equal_the_two_stages() {
     let mut random = Random::new(11);

@@ -25,8 +25,7 @@ pub(crate) fn small_plan(random: &mut Random, size: (usize, usize), change: impl
     random::plan(size, random.pick(&[-20, -1, 0, 5]), labels, &method)
 }
 
-/// Runs `stage` on the maps that `input` makes, for every size and many seeds, and compares all maps with the
-/// twin's.
+/// Runs `stage` on maps from `input`, for every size and many seeds, and compares all maps with the twin's.
 pub(crate) fn on_maps(
     stage: Stage,
     rounds: u64,
@@ -97,8 +96,7 @@ fn maps_without_valid_pixels() {
     }
 }
 
-/// (stage, whether its input has only flags of the left-right check, twin, change that makes the twin
-/// differ).
+/// (stage, whether its input only has flags of the left-right check, twin, change that makes it differ).
 pub(crate) type Control = (Stage, bool, Twin, fn(&mut Plan));
 
 /// Negative control: a wrong parameter of any stage is detected.

@@ -80,8 +80,7 @@ fn wide_beliefs_never_saturate() {
     }
 }
 
-/// A plan of either width with larger truncations than any normal plan, so that beliefs saturate on full
-/// graphs.
+/// A plan of either width with such large truncations that beliefs saturate on full graphs.
 fn saturating(neighbours: usize, width: VolumeWidth, rule: TruncationRule, resolution: Agreement) -> Plan {
     let mut method = Method::default();
     method.graph.percentile = 100.0 - neighbours as f64 * 100.0 / 48.0;

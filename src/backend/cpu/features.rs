@@ -45,8 +45,7 @@ impl Features {
         window_row(plan, &self.rows[y], windows.row(y), out);
     }
 
-    /// The costs of row `y` around the labels of `optima`, a byte each, from [`FAR`] labels below; undefined outside the
-    /// range.
+    /// A byte each: the costs of row `y` around the labels of `optima`, from [`FAR`] below; undefined outside.
     pub(super) fn costs_near(&self, plan: &Plan, y: usize, optima: &[Optimum], out: &mut [u64]) {
         near_row(plan, &self.rows[y], optima, out);
     }

@@ -163,8 +163,7 @@ struct Divisor(f64);
 impl Divisor {
     #[inline(always)]
     fn new(divisor: i32) -> Self {
-        // Far enough above 1 that rounding never lowers an exact quotient, and too close to 1 to raise any other to the next
-        // integer.
+        // So far above 1 that no exact quotient is rounded below itself, and so near that no other becomes exact.
         const ONE: f64 = 1.0 + 4.0 * f64::EPSILON;
         Self(ONE / f64::from(divisor))
     }

@@ -107,8 +107,7 @@ impl<U: Units> Volumes<U> {
         }
     }
 
-    /// Makes the messages between level `z` and the next finer one count as sent; if none have been, they
-    /// become 0.
+    /// Marks the messages between level `z` and the next finer one as sent; unsent ones become 0.
     fn store_resolution(&mut self, z: usize) {
         if !mem::replace(&mut self.levels[z].resolution_sent, true) {
             self.levels[z].up.fill(U::default());
@@ -186,8 +185,7 @@ impl<U: Units> Volumes<U> {
     }
 }
 
-/// Calls `with` for every slot of every pixel, with the pixel's window and the index of the slot's first
-/// cell.
+/// Calls `with` for every slot of every pixel, with the pixel's window and the slot's first index.
 fn each_row(level: &LevelPlan, windows: &Windows, slots: usize, mut with: impl FnMut(Window, usize)) {
     for (x, y) in (0..level.height).flat_map(|y| (0..level.width).map(move |x| (x, y))) {
         let window = windows.row(y)[x];

@@ -32,8 +32,7 @@ pub(super) trait Units:
     /// A value, clamped to the largest.
     fn of(value: u32) -> Self;
 
-    /// The values at even and at odd indices. (Written with words of two values, which compilers turn into
-    /// shuffles.)
+    /// The values at even and odd indices. (Written with words of two values, which compile to shuffles.)
     fn deinterleave(values: &[Self; 2 * LABEL_BLOCK]) -> [[Self; LABEL_BLOCK]; 2];
 
     /// `even` and `odd`, alternating.

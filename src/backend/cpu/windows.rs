@@ -232,8 +232,7 @@ pub(super) struct AlignedCells<'a, U> {
 }
 
 impl<'a, U: Units> AlignedCells<'a, U> {
-    /// The cells from `start` on in `cells`, of a pixel with `window`, one of `windows`; labels count from
-    /// `first`.
+    /// The cells from `start` on in `cells`, of a pixel with this `window`; labels count from `first`.
     #[inline(always)]
     pub(super) fn new(windows: &Windows, window: Window, cells: &'a [U], start: usize, first: usize) -> Self {
         let (shift, stride) =

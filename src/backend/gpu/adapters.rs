@@ -29,8 +29,7 @@ pub struct DeviceInfo {
     pub automatic: bool,
 }
 
-/// The first process that listed adapters, or 0. Drivers have threads, locks and connections, which do not
-/// survive a fork.
+/// The first process that listed adapters, or 0. Threads, locks and connections do not survive forks.
 static ASKED_BY: AtomicU32 = AtomicU32::new(0);
 
 /// Whether the last listing had no adapter for `auto`.
@@ -53,8 +52,7 @@ pub(super) async fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> 
     let mut descriptor = wgpu::InstanceDescriptor {
         backends,
         flags: wgpu::InstanceFlags::empty(),
-        // Above this share of the memory that the driver reports, allocations fail instead of evicting other
-        // buffers.
+        // Above this share of the reported memory, allocations fail instead of evicting other buffers.
         memory_budget_thresholds: wgpu::MemoryBudgetThresholds {
             for_resource_creation: Some(95),
             for_device_loss: None,

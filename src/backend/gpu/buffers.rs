@@ -54,8 +54,7 @@ struct Parts {
     whole: [u32; 2],
     /// The parts of its graph, and of its volumes if all their rows are held.
     starts: Vec<u32>,
-    /// If only some rows are held: the parts of the volumes, which share a ring of buffers, and the number of parts in
-    /// it.
+    /// For a ring of rows: the parts of the volumes, which share its buffers, and the number of buffers.
     in_turns: Option<(Vec<u32>, usize)>,
 }
 

@@ -15,7 +15,7 @@ pub(super) struct Convergence {
 }
 
 impl Convergence {
-    /// What these words say.
+    /// Decodes the words of the shader's state.
     pub(super) fn of(words: &[u32]) -> Self {
         *bytemuck::from_bytes(&bytemuck::cast_slice(words)[..size_of::<Self>()])
     }

@@ -8,8 +8,7 @@ use crate::program::{Run, together};
 use std::sync::Arc;
 
 impl Gpu {
-    /// Whether to hold all rows of level 0 for `plan` on this device: if the method's memory limit and its own memory allow
-    /// it.
+    /// Whether to hold all rows of level 0: if the method's memory limit and the device's memory allow it.
     pub(super) fn holds_all_rows(&self, plan: &Plan) -> bool {
         let streamed = together::streamed(plan);
         // Keep the decision for the last pair.

@@ -10,8 +10,7 @@ const SOFTWARE_WORK: u64 = 1 << 30;
 const BROWSER_WORK: u64 = 1 << 24;
 /// Submissions that take less than this grow twofold.
 const SHORT: Duration = Duration::from_millis(30);
-/// Submissions that take longer than this shrink, because progress stops meanwhile, and software drivers do not draw
-/// the page.
+/// Longer submissions shrink, because they delay progress bars, and the page itself with software drivers.
 const LONG: Duration = Duration::from_millis(200);
 /// Number of submissions to average times over. Browsers may report the ends of two at once.
 const ROUND: u32 = 2;

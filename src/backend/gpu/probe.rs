@@ -15,8 +15,7 @@ use pollster::block_on;
 use std::time::Duration;
 use web_time::Instant;
 
-/// Bytes that [`Gpu::copy_rate`] copies, number of tries, and minimum time of a try, which hides the overhead
-/// of submissions.
+/// Bytes that [`Gpu::copy_rate`] copies, number of tries, and minimum time of a try, to hide overhead.
 const COPIED_BYTES: u64 = 1 << 28;
 const COPY_TRIES: u32 = 12;
 const LONG_COPY: Duration = Duration::from_millis(100);

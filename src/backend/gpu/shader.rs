@@ -1,5 +1,4 @@
-//! Shaders, assembled from files: the stage's own file, the shared parts that it imports, and constants from
-//! Rust.
+//! Shaders, assembled from the stage's own file, the shared parts that it imports, and constants from Rust.
 
 use crate::maps::{FRACTION, flag};
 use crate::plan::{VolumeWidth, WINDOW_RUN};
@@ -145,8 +144,7 @@ fn shared_part(name: &str) -> &'static str {
     SHARED.iter().find(|part| part.0 == name).expect("an import names a file in shaders/shared").1
 }
 
-/// `text` without its `#import` lines. Adds the imported parts, and the parts that they import, to `parts`
-/// once each.
+/// `text` without its `#import` lines. Adds imported parts, and their imports, to `parts` once each.
 fn without_imports<'a>(text: &'a str, parts: &mut Vec<&'a str>) -> String {
     let mut body = String::with_capacity(text.len());
     for line in text.lines() {

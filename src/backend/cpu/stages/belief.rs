@@ -50,8 +50,7 @@ impl<'a, U: Units> Summands<'a, U> {
     }
 }
 
-/// The beliefs of row `y`; `dependency` has the dependency messages from cell `first` on, or is `None` if
-/// none were sent.
+/// The beliefs of row `y`; `dependency` has messages from cell `first` on, or is `None` if none were sent.
 #[pulp::with_simd(row = crate::vectors::widest())]
 #[inline(always)]
 pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(

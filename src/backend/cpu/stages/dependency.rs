@@ -161,8 +161,7 @@ impl<'a, U: Units> Near<'a, U> {
     }
 }
 
-/// Brings a row into the cache in sequential order, which prefetchers predict, unlike the order of the
-/// factors' accesses.
+/// Brings a row into the cache sequentially, which prefetchers predict, unlike the accesses of factors.
 pub(super) fn touch<U: Units>(row: &[U]) {
     const CACHE_LINE: usize = 64;
     let step = CACHE_LINE / size_of::<U>();

@@ -1,7 +1,6 @@
 //! Upsampled maps: see [`crate::backend::Stage::Enlarge`].
 //!
-//! Most pixels are far from edges and are interpolated. Only the others examine the 3 x 3 half-size pixels around
-//! them.
+//! Most pixels are far from edges and are interpolated. Only the others examine their neighbourhood.
 
 use crate::backend::cpu::units::each_lane;
 use crate::image::{Image, Pair, Pixel, Plane};
@@ -162,8 +161,7 @@ const _: () = assert!((UNKNOWN as i32 + 1) * LANES as i32 <= i16::MAX as i32);
 #[derive(Default)]
 struct Around {
     own: (usize, usize),
-    /// Columns, from 0 to 2, of the neighbours to the left and right, clamped to the image; then rows in the
-    /// same way.
+    /// Columns (0 to 2) of the neighbours to the left and right, clamped to the image; then rows likewise.
     beside: [[usize; 2]; 2],
     /// Whether pixels are inside and have a disparity.
     known: [bool; LANES],

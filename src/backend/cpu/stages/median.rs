@@ -57,7 +57,12 @@ pub(super) fn smooth(
 /// Computes the touched pixels of the current row of `window`.
 #[pulp::with_simd(median_row = crate::vectors::widest())]
 #[inline(always)]
-fn median_row_on<'a, S: pulp::Simd>(_: S, window: &'a mut MedianWindow, input: &'a MedianInput, row: &'a mut [i32]) {
+fn median_row_on<'a, S: pulp::Simd>(
+    _: S,
+    window: &'a mut MedianWindow,
+    input: &'a MedianInput,
+    row: &'a mut [i32],
+) {
     let mut x = 0;
     while let Some(skipped) = window.touched[x..].iter().position(|&touched| touched > 0) {
         x += skipped;
@@ -131,8 +136,7 @@ struct MedianWindow {
     /// Index of the row of the centres in the input.
     centre: usize,
     radius: usize,
-    /// By place: index in the input for the pixel in column 0, steps from the centre, and weight at equal
-    /// colour.
+    /// By place: index in the input for column 0, steps from the centre, and weight at equal colour.
     offsets: Vec<(usize, [i16; 2], u8)>,
     doublings: u32,
     /// Limits of the values of planes; `None` for the median alone.

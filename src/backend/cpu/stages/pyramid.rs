@@ -81,8 +81,7 @@ impl StoredCost for u16 {
     }
 }
 
-/// Coarse rows per task if the costs of fine rows are not stored. Fine rows that two tasks need are computed
-/// twice.
+/// Coarse rows per task if fine costs are not stored. Tasks recompute the fine rows that they share.
 const ROWS: usize = 16;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {

@@ -73,8 +73,7 @@ const NOWHERE: u16 = 1 << 15;
 /// Number of pixels whose costs are summed together, in vectors of 16 bits.
 const LANES: usize = 16;
 
-/// Sums for [`LANES`] pixels of the costs at the label below, at the label and above; 0 without sub-pixel
-/// disparities.
+/// Sums of costs below, at and above the label, for [`LANES`] pixels; 0 without sub-pixel disparities.
 type Sums = [[u16; LANES]; 3];
 
 #[derive(Default)]

@@ -223,8 +223,7 @@ fn sum_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut [u32], stride: usize, scratc
     }
 }
 
-/// The sums at `at` plus those carried along the column by `steps` from above and below, which start with the
-/// farthest.
+/// The sums at `at` plus those carried along the column by `steps` from above and below, farthest first.
 #[pulp::with_simd(sum_column = crate::vectors::widest())]
 #[inline(always)]
 fn sum_column_on<'a, S: pulp::Simd>(

@@ -1,7 +1,6 @@
 //! Beliefs: see [`Stage::Belief`](crate::backend::Stage::Belief).
 //!
-//! Lower bound per label: 6 bytes moved and requested, 20 operations for four; plus 8 bytes per pixel and 4 per member for the
-//! graph.
+//! Lower bound per label: 6 bytes moved and requested, 5 operations; for the graph 8 bytes per pixel and 4 per member.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};

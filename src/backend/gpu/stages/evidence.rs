@@ -1,7 +1,6 @@
 //! Evidence and the first beliefs: see [`Stage::Evidence`](crate::backend::Stage::Evidence).
 //!
-//! Lower bound per label: 3 bytes moved, 4 requested (the costs twice, for their minimum), 25 operations for
-//! four.
+//! Lower bound for four labels: 12 bytes moved, 16 requested (the costs twice, for their minimum), 25 operations.
 
 use super::cost;
 use crate::backend::gpu::commands::Recorder;

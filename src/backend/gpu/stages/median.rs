@@ -1,7 +1,6 @@
 //! The weighted median: see [`Stage::Median`](crate::backend::Stage::Median).
 //!
-//! Lower bound per pixel: 28 bytes moved; 3,000 bytes requested (the 105 places) and 2,500 operations in each of up to nine
-//! passes.
+//! Lower bound per pixel: 28 bytes moved; in up to nine passes 3,000 bytes requested (105 places), 2,500 operations.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Kernel, Variant};

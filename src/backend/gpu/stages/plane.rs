@@ -1,7 +1,6 @@
 //! Planes through the disparities: see [`Stage::Plane`](crate::backend::Stage::Plane).
 //!
-//! Lower bound per pixel: half of the median's, and 1,500 bytes requested (53 places) and 2,500 operations in each of two
-//! rounds.
+//! Lower bound per pixel: half of the median's, and in two rounds 1,500 bytes requested (53 places), 2,500 operations.
 
 use super::median;
 use crate::backend::gpu::commands::Recorder;

@@ -1,7 +1,6 @@
 //! Costs of the coarser levels: see [`Stage::Pyramid`](crate::backend::Stage::Pyramid).
 //!
-//! Lower bound per fine label of level 1: 1 + 2/8 bytes moved, 31 requested (the 5 x 5 window), 100 operations for four
-//! labels.
+//! Lower bound for four fine labels of level 1: 5 bytes moved, 124 requested (5 x 5 window), 100 operations.
 
 use super::cost;
 use crate::backend::gpu::commands::Recorder;

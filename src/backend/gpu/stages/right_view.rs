@@ -1,7 +1,6 @@
 //! The map of the right view: see [`Stage::RightView`](crate::backend::Stage::RightView).
 //!
-//! Lower bound per label: 1 byte moved, 4 requested (words of four labels, of which one is used), 20 operations
-//! for four.
+//! Lower bound for four labels: 4 bytes moved, 16 requested (words of four labels, one used), 20 operations.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};

@@ -43,8 +43,7 @@ pub(super) fn costs(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     });
 }
 
-/// Adds the row that enters the window, subtracts the one that leaves, and computes the costs of the centre
-/// row.
+/// Adds the row that enters the window, subtracts the one that leaves, and computes the centre row.
 #[pulp::with_simd(step = crate::vectors::widest())]
 #[inline(always)]
 fn step_on<'a, S: pulp::Simd>(
@@ -154,16 +153,14 @@ struct Views<'a> {
 }
 
 impl Views<'_> {
-    /// Index of the first right pixel of left column `x`, by label. Columns without right pixels have all of them in the
-    /// margin.
+    /// Index of the first right pixel, by label, of left column `x`; all are in the margin if there are none.
     #[inline(always)]
     fn place(&self, x: usize) -> usize {
         let (width, margin) = (self.level.width as i64, self.right.margin as i64);
         (margin + (width - 1 - x as i64 + i64::from(self.level.min)).clamp(-margin, width)) as usize
     }
 
-    /// Applies `change` to the sum of each column, with the differences of its pixel at the block of labels
-    /// at `at`.
+    /// Applies `change` to each column's sum, with its pixel's differences at the block of labels at `at`.
     #[inline(always)]
     fn each_difference(&self, at: usize, sums: &mut [Sum], change: impl Fn(&Sum, &Sum) -> Sum) {
         let pixels = self.left.pixels.row(self.y).iter().zip(self.left.masked.row(self.y));
