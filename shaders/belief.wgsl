@@ -7,7 +7,7 @@ struct Params {
     @align(16) band: Band,
     // Largest belief; larger sums saturate at it.
     most: u32,
-    // Whether there are messages from above and from below.
+    // Whether messages from above and below exist.
     has_down: u32,
     has_up: u32,
 }
@@ -16,7 +16,7 @@ struct Params {
 @group(0) @binding(2) var<storage, read> dependency: array<Quad>;
 // Codes of the neighbours, four per word.
 @group(0) @binding(3) var<storage, read> members: array<u32>;
-// A bit for each factor that holds the pixel, by its place around it.
+// A bit for each factor that holds the pixel, by its offset from the pixel.
 @group(0) @binding(4) var<storage, read> incoming: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read> down: array<Quad>;
 @group(0) @binding(6) var<storage, read> up: array<Quad>;
@@ -24,7 +24,7 @@ struct Params {
 @group(0) @binding(8) var<storage, read> windows: array<u32>;
 
 const CENTRE: u32 = WINDOW * WINDOW / 2u;
-// Words of a factor's codes.
+// Words of codes per factor.
 const MEMBER_WORDS: u32 = (SLOTS + 2u) / 4u;
 
 @compute @workgroup_size(GROUP)
@@ -69,7 +69,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         factors &= select(vec2(0u, factors.y - 1u), vec2(factors.x - 1u, factors.y), is_low);
         let fx = x + code % WINDOW - RADIUS;
         let fy = y + code / WINDOW - RADIUS - top;
-        // Seen from the factor, the pixel is at the opposite place. Where no slot says so, it is the factor's own.
+        // The pixel is at the opposite offset from the factor. Without its code in a slot, it is slot 0, the own pixel.
         let opposite = vec4(2u * CENTRE - code);
         var slots = vec4<u32>();
         let words = params.level.members_at + fy * params.level.member_pitch + fx * MEMBER_WORDS;

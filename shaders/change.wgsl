@@ -5,21 +5,21 @@
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // The largest sum at which the map has settled, lower and upper half, and whether that matters.
+    // Upper bound of a settled sum, lower and upper half, and whether it is used.
     most_low: u32,
     most_high: u32,
     may_settle: u32,
-    // Dispatches that end when it has.
+    // Number of dispatches that end once the map has settled.
     endings: u32,
 }
 
 struct Convergence {
-    // Sum of the last time, lower and upper half.
+    // The last sum, lower and upper half.
     sum: vec2<u32>,
-    // How often the map was looked at.
+    // Number of runs.
     runs: u32,
     settled: u32,
-    // How often it had settled before.
+    // Number of runs after it had settled.
     idle: u32,
 }
 
@@ -28,13 +28,13 @@ struct Convergence {
 @group(0) @binding(1) var<storage, read> belief: array<Quad>;
 @group(0) @binding(2) var<storage, read_write> label_map: array<u32>;
 @group(0) @binding(3) var<storage, read_write> squares: array<u32>;
-// Lower and upper half.
+// Lower and upper half of the sum of each row.
 @group(0) @binding(4) var<storage, read_write> row_sums: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read_write> convergence: Convergence;
-// Workgroups of the dispatches, in x, y and z.
+// Workgroup counts of the dispatches, in x, y and z.
 @group(0) @binding(6) var<storage, read_write> groups: array<u32>;
 
-// The label map, and each pixel's squared difference from the previous one. One invocation per pixel.
+// The label map, and the squared difference of each pixel from the previous map. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn labels(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);

@@ -1,4 +1,4 @@
-// The confidence of every pixel by itself: the margin between its optimum and its runner-up. One invocation per pixel.
+// The lead of each pixel's optimum over its runner-up. One invocation per pixel.
 
 #import band maps
 

@@ -6,7 +6,7 @@ struct Params {
     level: Level,
     @align(16) band: Band,
     outside_cost: u32,
-    // Cost of the largest colour difference, and the variance from which on colour has its full weight.
+    // Cost of the largest colour difference, and the variance above which colour has full weight.
     colour_weight: u32,
     colour_variance: u32,
     sad_radius: i32,
@@ -24,8 +24,8 @@ struct Params {
 @group(0) @binding(8) var<storage, read_write> right_census_out: array<vec2<u32>>;
 @group(0) @binding(9) var<storage, read_write> contrast_out: array<u32>;
 
-// Matching cost of level 0 by the mean colour difference over a window. One invocation per RUN pixels of a
-// row and quad of labels: it computes each column of the window once for all of them.
+// Matching cost by the mean colour difference over a window. One invocation per SAD_RUN pixels of a row and
+// quad of labels, which computes each column of the window once.
 @compute @workgroup_size(GROUP)
 fn sad(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -90,14 +90,14 @@ fn sad(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index)
     }
 }
 
-// The bits of a census with one more.
+// Appends a bit to a census.
 fn with_bit(bits: vec2<u32>, bit: bool) -> vec2<u32> {
     return vec2((bits.x << 1u) | u32(bit), (bits.y << 1u) | (bits.x >> 31u));
 }
 
-// Census of every pixel of both images: a bit for each other pixel of a 9 x 7 window in raster order, set where
-// its grey is below the centre's. And the weight of colour at the pixels of the left image, from the variance of
-// grey in that window. One invocation per pixel.
+// Census of both images: a bit for each other pixel of the 9 x 7 window in raster order, set if its grey is
+// below that of the centre. Also the weight of colour at each left pixel, by the variance of grey in the
+// window. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -142,7 +142,7 @@ fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     contrast_out[out] = w;
 }
 
-// Matching cost of level 0 by census and colour difference. One invocation per pixel and quad of labels.
+// Matching cost by census and colour difference. One invocation per pixel and quad of labels.
 @compute @workgroup_size(GROUP)
 fn ad_census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);

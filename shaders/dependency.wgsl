@@ -20,7 +20,7 @@ struct Params {
 
 const ABSENT: u32 = 0xffffffffu;
 
-// A member's message to the factor: its belief minus the factor's old message, and minus `least` where
+// A member's message to the factor: its belief minus the factor's old message, and minus `least` if
 // truncation is absolute; infinite at labels that the member does not have.
 fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
     let b = unpack(belief[member]);
@@ -48,7 +48,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let beliefs = params.band.volume_at;
     bases[0] = beliefs + (y - top) * params.level.pitch + id.x;
     var present = 1u;
-    // What any member has: messages at other labels reach nobody.
+    // The labels of any member; messages at other labels are never read.
     var spanned = quads_of(window_of(id.x, y));
     let codes = params.level.members_at + id.y * params.level.member_pitch + id.x * ((SLOTS + 2u) / 4u);
     for (var slot = 1u; slot < SLOTS; slot++) {
@@ -67,8 +67,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
 
-    // Where truncation is absolute, the minimum of each member's message to the factor, over the labels that the
-    // factor's own pixel has, is subtracted from it.
+    // For absolute truncation, subtract the minimum of each member's message to the factor over the labels
+    // that the factor's own pixel has.
     var floors: array<u32, SLOTS>;
     if ABSOLUTE {
         for (var slot = 0u; slot < SLOTS; slot++) {
@@ -119,7 +119,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
 
     if STEPS {
-        // The sums stand where the messages will. All are infinite at labels that the factor's own pixel or the member does not have.
+        // Sums are stored in place of the messages, and infinite at labels that the factor's own pixel or the member does not have.
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
                 var below = MOST;

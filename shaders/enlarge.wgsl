@@ -1,11 +1,11 @@
-// The maps at full size of a pair that is matched at half of it. One invocation a pixel of the full size.
+// Upsamples the maps of a pair matched at half its size. One invocation per full-size pixel.
 
 #import band image maps
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // Elements in a row of the full size.
+    // Elements per full-size row.
     full_pitch: u32,
     // The range at full size, in 1/256 px.
     low: i32,
@@ -23,12 +23,12 @@ struct Params {
 @group(0) @binding(7) var<storage, read_write> full_disparity: array<i32>;
 @group(0) @binding(8) var<storage, read_write> full_flags: array<u32>;
 
-// How far the disparity of a pixel of half the size is above the smallest of the full size.
+// The full-size disparity of a half-size pixel, minus the smallest one.
 fn above_low(at: u32) -> i32 {
     return clamp(2 * disparity[at], params.low, params.high) - params.low;
 }
 
-// How unlike the colour of a pixel of half the size is to another, in 8-bit levels.
+// Colour difference of a half-size pixel from another colour, in 8-bit levels.
 fn unlike(at: u32, colour: vec3<u32>) -> i32 {
     return i32(difference(channels(left[at]) >> vec3(8u), colour));
 }
@@ -54,7 +54,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var like = own_at;
     let masked = (word >> 24u) != 0u;
     if has_disparity(flags[own_at]) && !masked {
-        // The span of the disparities around it, and the pixel that it is most like.
+        // The span of the disparities around it, and the most similar pixel.
         var least = value;
         var most = value;
         var best = 0x7fffffff;
@@ -110,14 +110,14 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     full_flags[out] = select(flags[like], MASKED, masked);
 }
 
-// How far a pixel of half the size is away, along x and y, in pixels of the full size.
+// City block distance of a half-size pixel, in full-size pixels.
 fn away(at: vec2<i32>, column: u32, own_row: i32, j: u32) -> i32 {
     let place = vec2(i32(column), 2 * own_row + i32(j));
     let halves = abs(4 * at + 1 - 2 * place);
     return (halves.x + halves.y) / 2;
 }
 
-// What `at` is above the smallest disparity, or `own` where it has none.
+// `above_low` of `at`, or of `own` if `at` has no disparity.
 fn above_low_or(at: u32, own: u32) -> i32 {
     return above_low(select(own, at, has_disparity(flags[at])));
 }

@@ -1,4 +1,4 @@
-// Evidence from cost, and the initial beliefs. One invocation per pixel.
+// Evidence from costs, and the initial beliefs. One invocation per pixel.
 
 #import band volume windows messages
 
@@ -13,7 +13,7 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-// 8-bit at level 0, 16-bit at coarser ones.
+// 8-bit at level 0, 16-bit at coarser levels.
 @group(0) @binding(1) var<storage, read> cost: array<u32>;
 @group(0) @binding(2) var<storage, read_write> evidence: array<u32>;
 @group(0) @binding(3) var<storage, read_write> belief: array<Quad>;

@@ -1,18 +1,18 @@
-// Planes through measured pixels, carried from patch to patch of 4 x 4 pixels. Twice `gather`, `carry_rows`, `rise` and `sink`, then `take`.
+// Planes through measured pixels, carried from patch to patch. Twice `gather`, `carry_rows`, `rise` and `sink`, then `take`.
 
 #import band image maps
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // Patches in a row, and rows of them.
+    // (columns, rows) of patches.
     across: u32,
     down: u32,
-    // Words in a row of them.
+    // Words per row of patches.
     pitch: u32,
-    // First row of patches that is bound.
+    // First bound row of patches.
     first_bound: u32,
-    // 1 where there are planes from the round before, else 0.
+    // 1 in the second round, when planes exist, else 0.
     again: u32,
 }
 
@@ -20,13 +20,13 @@ struct Params {
 @group(0) @binding(1) var<storage, read> left: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read_write> flags: array<u32>;
 @group(0) @binding(3) var<storage, read_write> disparity: array<i32>;
-// By row of patches: their own moments, number by number, and their colours; what has reached them along their row, and then from above,
-// too; what reaches them from the right, and then from below, and at last their planes.
+// By row of patches, number by number: own moments (OWN) and colours (COLOUR); moments summed along the row
+// so far, then also from above (SUM); moments from the right, then from below, and finally planes (BACK).
 @group(0) @binding(4) var<storage, read_write> patches: array<i32>;
-// Shares of weight that are left after a step, in 1/256, by the difference between two patches.
+// Share of weight that is left after a step, in 1/256, by the difference of two patches.
 @group(0) @binding(5) var<storage, read> patch_shares: array<u32>;
 
-// The first number of each of these.
+// Index of the first number of each of these.
 const OWN: u32 = 0u;
 const COLOUR: u32 = 10u;
 const SUM: u32 = 11u;
@@ -36,7 +36,7 @@ const NO_PLANE: i32 = 0;
 const PLANE: i32 = 1;
 const TRUSTED: i32 = 2;
 
-// Weighted moments of measured pixels; their mean place counts from the middle of a patch.
+// Weighted moments of measured pixels; the mean position is relative to the middle of a patch.
 struct Moments {
     weight: u32,
     mean: vec2<i32>,
@@ -48,19 +48,19 @@ struct Moments {
     dd: i32,
 }
 
-// A plane: whether there is one, its value in the middle of the patch, and its slopes.
+// A plane: its state (NO_PLANE, PLANE or TRUSTED), its value in the middle of the patch, and its slopes.
 struct Plane {
     state: i32,
     value: i32,
     slopes: vec2<i32>,
 }
 
-// Where number `number` of a patch is.
+// Index of number `number` of a patch.
 fn place_of(number: u32, at: vec2<u32>) -> u32 {
     return (at.y - params.first_bound) * params.pitch + number * params.across + at.x;
 }
 
-// The moments of a patch from number `first` on.
+// The moments of a patch that start at number `first`.
 fn moments(first: u32, at: vec2<u32>) -> Moments {
     let i = place_of(first, at);
     let n = params.across;
@@ -101,7 +101,7 @@ fn set_plane(at: vec2<u32>, plane: Plane) {
     patches[i + 3u * n] = plane.slopes.y;
 }
 
-// How far a pixel is from the middle of its patch, in half pixels.
+// Distance of a pixel from the middle of its patch, in half pixels.
 fn from_middle(pixel: vec2<u32>) -> vec2<i32> {
     return 2 * vec2<i32>(pixel % vec2(PATCH)) - vec2(i32(PATCH) - 1);
 }
@@ -112,7 +112,7 @@ fn value_at(plane: Plane, pixel: vec2<u32>) -> i32 {
     return (plane.value + up.x + up.y + 2) >> 2u;
 }
 
-// What a patch has of its own. One invocation per patch.
+// The patches' own moments and colours. One invocation per patch.
 @compute @workgroup_size(GROUP)
 fn gather(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -191,7 +191,7 @@ fn share_between(a: vec2<u32>, b: vec2<u32>) -> u32 {
     return patch_shares[min(apart, LAST_SHARE)];
 }
 
-// Moments as seen from a patch that is `step` patches away, where `share` / 256 of their weight is left.
+// Moments relative to a patch that is `step` patches away, with `share` / 256 of their weight.
 fn carried(m: Moments, step: vec2<i32>, share: u32) -> Moments {
     var out = m;
     out.mean = clamp(m.mean - 1024 * i32(PATCH) * step, vec2(-REACH), vec2(REACH));
@@ -199,12 +199,12 @@ fn carried(m: Moments, step: vec2<i32>, share: u32) -> Moments {
     return out;
 }
 
-// One moment of two sets together, from those of each and what is between them.
+// One moment of two merged sets, from the moment of each and the term `between` them.
 fn moment(a: i32, b: i32, share: i32, between: i32) -> i32 {
     return clamp(a + (((b - a) * share + 512) >> 10u) + between, -MOMENT, MOMENT);
 }
 
-// Two sets of pixels together.
+// Merges the moments of two sets of pixels.
 fn both(a: Moments, b: Moments) -> Moments {
     if b.weight == 0u {
         return a;
@@ -267,7 +267,7 @@ fn carry_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     }
 }
 
-// What comes from below, by bands of rows from the last one on. One invocation per column of patches.
+// Moments from below, by bands of rows from the last to the first. One invocation per column of patches.
 @compute @workgroup_size(GROUP)
 fn rise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let x = place(group, lane).x;
@@ -290,7 +290,7 @@ fn rise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     set_moments(BACK, vec2(x, first), carry);
 }
 
-// What comes from above, by bands of rows from the first one on, and the planes. One invocation per column of patches.
+// Moments from above, by bands from the first to the last, and planes. One invocation per column of patches.
 @compute @workgroup_size(GROUP)
 fn sink(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let x = place(group, lane).x;
@@ -308,13 +308,13 @@ fn sink(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             line = carried(line, vec2(0, 1), share_between(vec2(x, y - 1u), here));
         }
         line = both(moments(SUM, here), line);
-        // First, so that fewer registers are held.
+        // Written first to save registers.
         set_moments(SUM, here, line);
         set_plane(here, fit(both(line, moments(BACK, here))));
     }
 }
 
-// The slopes along the axis with the larger moment and along the other one.
+// (slope along the axis p with the larger moment, slope along the other axis q).
 fn slopes(pp: i32, pq: i32, qq: i32, pd: i32, qd: i32) -> vec2<i32> {
     let tilt = clamp((pq << 11u) / pp, -2048, 2048);
     let q = max(qq - ((tilt * pq) >> 11u), 1);
@@ -329,7 +329,7 @@ fn product(slope: i32, moment: i32) -> i32 {
     return 2 * slope * (moment >> 10u) + ((slope * (moment & 1023)) >> 9u);
 }
 
-// The plane through these pixels.
+// The plane through the pixels with these moments.
 fn fit(m: Moments) -> Plane {
     if m.weight < LEAST {
         return Plane(NO_PLANE, 0, vec2(0));
@@ -348,8 +348,8 @@ fn fit(m: Moments) -> Plane {
     return Plane(state, m.disparity - up.x - up.y, tilt);
 }
 
-// Filled pixels take the value of the plane of their patch, and so do measured ones in doubt that are far from it. One invocation per
-// pixel.
+// Filled pixels take the value of the plane of their patch, and so do doubtful measured ones that are far
+// from it. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);

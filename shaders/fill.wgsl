@@ -1,15 +1,15 @@
-// Fills invalid pixels from the nearest valid ones: `rows` finds the rows that have a valid pixel, `sources`
-// the row that each row takes its values from, and `fill` fills.
+// Fills invalid pixels from the nearest valid ones: `rows` finds the rows with a valid pixel, `sources` the
+// row from which each row is filled, and `fill` fills.
 
 #import band maps
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // Rows of the map that `fill` takes values from.
+    // The source rows that are bound for `fill`.
     source_first_row: u32,
     source_rows: u32,
-    // 1 where the larger of two disparities is the farther one, else 0.
+    // 1 if the larger of two disparities is the farther one, else 0.
     farther_is_larger: u32,
 }
 
@@ -21,11 +21,11 @@ struct Params {
 @group(0) @binding(4) var<storage, read> source_flags: array<u32>;
 @group(0) @binding(5) var<storage, read_write> next_disparity: array<i32>;
 @group(0) @binding(6) var<storage, read_write> next_flags: array<u32>;
-// For every row: 1 if it holds a valid pixel, else 0; and the row that it takes its values from.
+// For every row: 1 if it has a valid pixel, else 0; and the row from which it is filled.
 @group(0) @binding(7) var<storage, read_write> known_rows: array<u32>;
 @group(0) @binding(8) var<storage, read_write> row_sources: array<u32>;
 
-// Whether each row holds a valid pixel. One invocation per row.
+// Whether each row has a valid pixel. One invocation per row.
 @compute @workgroup_size(GROUP)
 fn rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -39,8 +39,8 @@ fn rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     known_rows[params.band.first_row + id.x] = u32(x < params.level.width);
 }
 
-// The row that each row takes its values from: the nearest that holds a valid pixel, the upper one of two;
-// the row itself where there is none. One invocation per row.
+// The row from which each row is filled: the nearest with a valid pixel, the upper one of two; the row itself
+// if there is none. One invocation per row.
 @compute @workgroup_size(GROUP)
 fn sources(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -64,7 +64,7 @@ fn sources(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
 }
 
 // Fills invalid pixels with the farther of the two nearest valid disparities. One invocation per pixel.
-// Pixels whose row takes its values from outside the source rows are filled by another dispatch.
+// Pixels with a source row outside the bound ones are filled by another dispatch.
 @compute @workgroup_size(GROUP)
 fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);

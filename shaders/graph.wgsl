@@ -1,17 +1,17 @@
-// The graph of a level: `downsample` the guide of the next finer level, `choose` the members of every factor, and
-// `transpose` the table of the members. One invocation per pixel.
+// The graph of a level: `downsample` computes the guide from the next finer level, `choose` the members of
+// every factor, and `transpose` their transposed table. One invocation per pixel.
 
 #import band volume image sections
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // Codes of the neighbours, the nearest first, four per word.
+    // Codes of the neighbours, nearest first, four per word.
     ranked: array<vec4<u32>, PLACES / 16u>,
     @align(16) fine: Level,
     // Weight of a squared pixel of distance.
     weight: u32,
-    // Where the guide of the level begins in what is bound, and that of the next finer one.
+    // Offsets of the guide of the level and of the next finer one in the bindings.
     guide_at: u32,
     fine_at: u32,
 }
@@ -21,11 +21,11 @@ struct Params {
 // Codes of the neighbours, four per word.
 @group(0) @binding(3) var<storage, read_write> members_out: array<u32>;
 @group(0) @binding(4) var<storage, read> members_in: array<u32>;
-// A bit for each factor that holds the pixel, by its place around it.
+// A bit for each factor that holds the pixel, by its offset from the pixel.
 @group(0) @binding(5) var<storage, read_write> incoming: array<vec2<u32>>;
 @group(0) @binding(6) var<storage, read> fine_guide: array<vec4<u32>>;
 
-// Words of a factor's codes.
+// Words of codes per factor.
 const MEMBER_WORDS: u32 = (NEIGHBOURS + 3u) / 4u;
 
 // The binomial mean over the unmasked pixels around twice (x, y).
@@ -79,7 +79,7 @@ fn choose(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     let pitch = params.level.pixel_pitch;
     let centre = guide[params.guide_at + (here.y - top) * pitch + id.x];
     let out = params.level.members_at + id.y * params.level.member_pitch + id.x * MEMBER_WORDS;
-    // The keys of each pass are above those of the last one.
+    // The keys of each pass are above those of the previous pass.
     var last = -1;
     for (var first = 0u; first < NEIGHBOURS; first += CHOSEN) {
         var keys: array<i32, CHOSEN>;
@@ -89,7 +89,7 @@ fn choose(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
         for (var rank = 0u; rank < PLACES; rank++) {
             let code = code_of(rank);
             let steps = vec2(code % WINDOW, code / WINDOW);
-            // Beyond the upper and the left border, this wraps to large numbers.
+            // Beyond the upper and left borders, this wraps to large numbers.
             let there = here + steps - vec2(RADIUS);
             if all(there < size) {
                 let pixel = guide[params.guide_at + (there.y - top) * pitch + there.x];
@@ -134,7 +134,7 @@ fn code_of(rank: u32) -> u32 {
     return (params.ranked[rank / 16u][(rank / 4u) % 4u] >> (8u * (rank % 4u))) & 0xffu;
 }
 
-// Asks all factors of the window whether they hold the pixel.
+// Tests for all factors in the window whether they hold the pixel.
 @compute @workgroup_size(GROUP)
 fn transpose(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     enter(group);
@@ -149,7 +149,7 @@ fn transpose(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     for (var code = 0u; code <= PLACES; code++) {
         let there = here + vec2(code % WINDOW, code / WINDOW) - vec2(RADIUS);
         if all(there < size) {
-            // Seen from there, the pixel is at the opposite place. Every factor holds its own pixel.
+            // The pixel is at the opposite offset from the factor. Every factor holds its own pixel.
             let opposite = PLACES - code;
             var holds = code == opposite;
             let words = params.level.members_at + (there.y - top) * params.level.member_pitch + there.x * MEMBER_WORDS;

@@ -1,7 +1,7 @@
-//! Registers, spills and occupancy of every variant of every shader on Radeons, by Mesa's compiler: see `scripts/isa`.
+//! Registers, spills and occupancy of all variants of all shaders on Radeons, from Mesa: see `scripts/isa`.
 //!
-//! Mesa's driver RADV can pretend to have any Radeon. It then compiles for it and can run nothing. wgpu's start-up runs
-//! something, and wgpu does not pass on what a driver says of a shader, so this asks Vulkan itself.
+//! Mesa's driver RADV can emulate any Radeon: it compiles for it but cannot run anything. wgpu runs something
+//! at start-up, and does not expose statistics of shaders, so this program calls Vulkan directly.
 
 #![allow(unsafe_code, reason = "the calls of Vulkan")]
 
@@ -18,17 +18,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::CString;
 use std::process::ExitCode;
 
-/// The GPUs, by RADV's names for them: RDNA 2, Vega and Polaris.
+/// The GPUs, by their names in RADV: RDNA 2, Vega and Polaris.
 const GPUS: [&str; 3] = ["navi21", "vega10", "polaris10"];
 
-/// The least occupancy of a kernel: waves that a SIMD holds of it, in percent of what it holds of an empty one.
+/// Smallest occupancy of a kernel: waves per SIMD, in percent of those of an empty kernel.
 const FLOOR: u64 = 60;
 
-/// A kernel that need not reach [`FLOOR`], and why.
+/// A kernel that may stay below [`FLOOR`], and why.
 struct Exception {
     kernel: &'static str,
     floor: u64,
-    /// Whether its arrays, and registers, may lie in memory.
+    /// Whether its arrays and registers may be in memory.
     scratch: bool,
     reason: &'static str,
 }
@@ -53,18 +53,18 @@ const EXCEPTIONS: &[Exception] = &[
     Exception { kernel: "dependency/49", floor: 10, scratch: true, reason: MANY_MEMBERS },
 ];
 
-/// What the driver says of a kernel; of several, the worst of each.
+/// Statistics of a kernel, or the worst of several kernels.
 #[derive(Clone, Copy, Debug, Default)]
 struct Figures {
     vgprs: u64,
     sgprs: u64,
-    /// Registers that lie in memory.
+    /// Registers that are spilled to memory.
     spills: u64,
-    /// Bytes of memory that a wave needs for them, and for arrays that are no registers.
+    /// Bytes of memory per wave for spills and for arrays that are not in registers.
     scratch: u64,
     waves: u64,
     lds: u64,
-    /// Cycles between two waves, guessed from the code: the compiler does not know how often a loop runs.
+    /// Estimated cycles between two waves; the compiler does not know the iterations of loops.
     cycles: u64,
 }
 
@@ -81,7 +81,7 @@ impl Figures {
         }
     }
 
-    /// What is wrong with a kernel called `name`, where a SIMD holds at most `most` waves.
+    /// The faults of a kernel called `name`, if a SIMD can hold `most` waves.
     fn faults(self, name: &str, most: u64) -> Vec<String> {
         let exception = Exception::of(name);
         let floor = exception.map_or(FLOOR, |exception| exception.floor);
@@ -114,7 +114,7 @@ fn run(names: &[String]) -> Result<(), String> {
         return Err(format!("there is no GPU `{name}`; the GPUs are {}", GPUS.join(", ")));
     }
     let gpus = GPUS.into_iter().filter(|gpu| names.is_empty() || names.iter().any(|name| name == gpu));
-    // All of them before there are threads.
+    // Open all before starting threads.
     let radeons = gpus.map(Radeon::open).collect::<Result<Vec<_>, _>>()?;
     let kernels: Vec<Shader> =
         variants::kernels(&variants::plans()).into_iter().map(|kernel| kernel.shader).collect();
@@ -174,7 +174,7 @@ fn run(names: &[String]) -> Result<(), String> {
     Err(faults.join("\n"))
 }
 
-/// The name of a kernel, which its variants share. Arrays of one item a slot make others of it.
+/// The name of a kernel, shared by variants with the same number of slots.
 fn name(kernel: &Shader) -> String {
     let entry = match kernel.entry {
         "main" => String::new(),
@@ -187,10 +187,10 @@ fn name(kernel: &Shader) -> String {
     format!("{}{entry}{}", kernel.stage, slots.unwrap_or_default())
 }
 
-/// A kernel of which a SIMD holds as many waves as it can.
+/// A kernel with the largest occupancy.
 const EMPTY: &str = "@compute @workgroup_size(64) fn main() {}";
 
-/// A kernel that needs `count` values at the same time, each in a register of its own.
+/// A kernel with `count` live values, each in its own register.
 fn with_live_values(count: usize) -> String {
     let each = |line: fn(usize, usize) -> String| (0..count).map(|i| line(i, count)).collect::<String>();
     format!(
@@ -205,7 +205,7 @@ fn with_live_values(count: usize) -> String {
     )
 }
 
-/// RADV, as if this GPU were there. Nothing of it is freed before the program ends.
+/// RADV emulating this GPU. Nothing is freed before the program ends.
 struct Radeon {
     name: &'static str,
     device: ash::Device,
@@ -215,11 +215,11 @@ struct Radeon {
 }
 
 impl Radeon {
-    /// The environment is changed, so no other thread may run.
+    /// Sets an environment variable, so no other threads may run.
     fn open(name: &'static str) -> Result<Self, String> {
         // SAFETY: no other thread reads the environment.
         unsafe { std::env::set_var("RADV_FORCE_FAMILY", name) };
-        // SAFETY: what is passed is valid and lives as long as the calls.
+        // SAFETY: the arguments are valid and live as long as the calls.
         unsafe { Self::create(name) }.map_err(|e| format!("{name}: {e}"))
     }
 
@@ -238,7 +238,7 @@ impl Radeon {
         };
         let physical = found.into_iter().find(is_radv).ok_or("no RADV; run scripts/isa, which finds it")?;
 
-        // What wgpu asks for that changes the code.
+        // Features that wgpu enables and that change the code.
         let core = vk::PhysicalDeviceFeatures::default().robust_buffer_access(true);
         let mut robust = vk::PhysicalDeviceRobustness2FeaturesEXT::default().robust_buffer_access2(true);
         let mut zeros =
@@ -261,7 +261,7 @@ impl Radeon {
         Ok(Self { name, device, executables, _entry: entry })
     }
 
-    /// What the driver says of the entry point `entry` of the shader `source`.
+    /// Statistics of the entry point `entry` of the shader `source`.
     fn compile(&self, source: &str, entry: &str) -> Result<Figures, String> {
         let (module, words) = spirv(source)?;
         let bindings: Vec<_> = module
@@ -279,7 +279,7 @@ impl Radeon {
             })
             .collect();
         let entry = CString::new(entry).map_err(|e| e.to_string())?;
-        // SAFETY: naga makes valid SPIR-V, `bindings` has what it binds, and all lives as long as the calls.
+        // SAFETY: naga emits valid SPIR-V, `bindings` has all its bindings, and all arguments outlive the calls.
         let statistics = unsafe { self.statistics(&bindings, &words, &entry) }.map_err(|e| e.to_string())?;
         let figure = |name: &str| {
             let found = statistics.get(name).copied();
@@ -330,7 +330,7 @@ impl Radeon {
         Ok(named.collect())
     }
 
-    /// Control: a kernel that needs more registers than there are is found.
+    /// Control: a kernel that needs more registers than exist is reported.
     fn control(&self, most: u64) -> Result<(), String> {
         let (small, large) =
             (self.compile(&with_live_values(8), "main")?, self.compile(&with_live_values(300), "main")?);
@@ -341,7 +341,7 @@ impl Radeon {
     }
 }
 
-/// A shader in SPIR-V, as wgpu makes it for this driver.
+/// Translates a shader to SPIR-V like wgpu for this driver.
 fn spirv(source: &str) -> Result<(naga::Module, Vec<u32>), String> {
     let module = naga::front::wgsl::parse_str(source).map_err(|e| e.emit_to_string(source))?;
     let info = Validator::new(ValidationFlags::all(), Capabilities::empty())

@@ -9,7 +9,7 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-// 8-bit at level 0, 16-bit at coarser ones.
+// 8-bit at level 0, 16-bit at coarser levels.
 @group(0) @binding(1) var<storage, read_write> cost: array<u32>;
 // First and last label of each pixel, first | last << 16.
 @group(0) @binding(2) var<storage, read> label_range: array<u32>;

@@ -1,16 +1,16 @@
-// Label windows, first label | number of labels with padding << 16: `within` label ranges; or, from the next
-// coarser level, `candidates` and then `around` them.
+// Label windows as first label | number of labels with padding << 16: `within` label ranges, or `around` the
+// `candidates` of the next coarser level.
 
 #import band volume windows messages
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // Windows in a row, and labels of the level that the windows are for, without and with padding.
+    // Windows per row, and labels of their level without and with padding.
     runs: u32,
     labels: u32,
     stride: u32,
-    // Its label that agrees best with label 0 of the next coarser level: 0 or -1.
+    // The label of this level that agrees best with label 0 of the next coarser one: 0 or -1.
     label_offset: i32,
 }
 
@@ -22,10 +22,10 @@ struct Params {
 // First and last label of each pixel, first | last << 16.
 @group(0) @binding(4) var<storage, read> label_range: array<u32>;
 @group(0) @binding(5) var<storage, read_write> windows_out: array<u32>;
-// Those of the coarser level.
+// Windows of the coarser level.
 @group(0) @binding(6) var<storage, read> windows: array<u32>;
 
-// The window that holds the labels from `least` to `most`.
+// The window that contains the labels from `least` to `most`.
 fn holding(least: i32, most: i32) -> u32 {
     let last = i32(params.labels) - 1;
     let first = u32(clamp(least, 0, last)) / WINDOW_STEP * WINDOW_STEP;
@@ -60,7 +60,7 @@ fn candidates(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     candidates_out[id.y * params.level.pixel_pitch + id.x] = smallest(lowest) | (last << 16u);
 }
 
-// One invocation per window; rows of windows are those of the coarser level.
+// One invocation per window; rows of windows are rows of the coarser level.
 @compute @workgroup_size(GROUP)
 fn around(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -85,7 +85,7 @@ fn around(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     windows_out[y * params.runs + id.x] = holding(needed.x - MARGIN, needed.y + MARGIN);
 }
 
-// One invocation per window and row; those of every second row do nothing.
+// One invocation per window and row; every second row does nothing.
 @compute @workgroup_size(GROUP)
 fn within(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);

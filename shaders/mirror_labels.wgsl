@@ -1,4 +1,4 @@
-// The labels of the mirrored pair, seen from the pair itself. One invocation per pixel.
+// Labels of the mirrored pair in the geometry of the pair. One invocation per pixel.
 
 #import band
 

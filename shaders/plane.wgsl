@@ -1,15 +1,15 @@
-// The value of a plane through the disparities around every pixel, which starts from the weighted median. One invocation per pixel.
+// The value at each pixel of a plane fitted around it, from the weighted median on. One invocation per pixel.
 
 #import band weighted_median
 
-// Where the plane so far passes at a pixel, above the median, and its slopes.
+// A plane: its value at the pixel relative to the median, and its slopes.
 struct Plane {
     value: i32,
     slopes: vec2<i32>,
 }
 
-// A round of least squares over window `w`, from `plane` above `median`. Disparities count up to 256 of 2 to `bits`
-// 1/256 px from the plane.
+// A round of least squares over window `w`, from `plane` relative to `median`. Disparities count up to 2^(8 +
+// `bits`) / 256 px from the plane.
 fn fit(w: Window, median: i32, plane: Plane, bits: u32) -> Plane {
     let base = median + plane.value;
     var all = 0;

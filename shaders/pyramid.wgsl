@@ -1,5 +1,6 @@
-// Cost of a level from the next finer one: a low-pass in x and y, then a low-pass or minimum in d. One
-// invocation per coarse pixel and pair of coarse labels, which share the fine labels between them.
+// Cost of a level from the next finer one: a low-pass in x and y, then a low-pass or minimum over
+// disparities. One invocation per coarse pixel and pair of coarse labels, which share the fine labels between
+// them.
 
 #import band volume
 
@@ -12,12 +13,11 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-// 8-bit at level 0, 16-bit at coarser ones.
+// 8-bit at level 0, 16-bit at coarser levels.
 @group(0) @binding(1) var<storage, read> fine_cost: array<u32>;
 @group(0) @binding(2) var<storage, read_write> cost: array<u32>;
 
-// The binomial mean over x and y of the fine cost around twice (x, y), at the fine label with this index,
-// clamped.
+// The binomial mean over x and y of the fine cost around (2 x, 2 y), at the fine label `index`, clamped.
 fn smooth_cost(x: i32, y: i32, index: i32) -> u32 {
     let label = u32(clamp(index, 0, i32(params.fine.labels) - 1));
     let top = max(2 * params.band.first_row, 2u) - 2u;

@@ -1,12 +1,12 @@
-// Disparities of a pair that is matched at half its size, by the views at full size: `census`, `costs`, `fit`.
-// A row of half the size stands for two rows of blocks.
+// Refines the disparities of a pair matched at half its size by the full-size views: `census`, `costs`,
+// `fit`. A half-size row covers two full-size rows.
 
 #import band maps volume
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // Elements in a row of the full size.
+    // Elements per full-size row.
     full_pitch: u32,
 }
 
@@ -20,13 +20,13 @@ struct Params {
 @group(0) @binding(6) var<storage, read> full_right_census: array<u32>;
 // label | best << 16, runner-up.
 @group(0) @binding(7) var<storage, read> optima: array<vec2<u32>>;
-// Four costs a word: the first words of all pixels of a row, then the second ones, and so on.
+// Four costs per word: the first words of all pixels of a row, then the second ones, and so on.
 @group(0) @binding(8) var<storage, read_write> block_costs_out: array<u32>;
 @group(0) @binding(9) var<storage, read> block_costs: array<u32>;
 @group(0) @binding(10) var<storage, read_write> raw: array<i32>;
 @group(0) @binding(11) var<storage, read_write> disparity: array<i32>;
 
-// Census of the pixels of both views, in 16 bits. One invocation a pixel of the full size.
+// 16-bit census of the pixels of both views. One invocation per full-size pixel.
 @compute @workgroup_size(GROUP)
 fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -47,7 +47,7 @@ fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     for (var dy = -2; dy <= 2; dy++) {
         let row = (u32(clamp(y + dy, 0, last.y)) - top) * params.full_pitch;
         for (var dx = -2; dx <= 2; dx++) {
-            // The eight around it, and those twice as far.
+            // The eight neighbours, and others at distance 2.
             let near = max(abs(dx), abs(dy)) == 1;
             if near || (dx % 2 == 0 && dy % 2 == 0 && (dx != 0 || dy != 0)) {
                 let at = row + u32(clamp(x + dx, 0, last.x));
@@ -63,7 +63,7 @@ fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     full_right_census_out[out] = select(NO_CENSUS, right_bits, (r.x >> 24u) == 0u);
 }
 
-// The costs of a block around twice the disparity of its label. One invocation for four costs of a pixel of half the size.
+// The costs of a block around twice the disparity of its label. One invocation per half-size pixel and four costs.
 @compute @workgroup_size(GROUP)
 fn costs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -94,13 +94,13 @@ fn costs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     block_costs_out[4u * id.y * params.level.pixel_pitch + word * params.level.pixel_pitch + x] = pack_narrow(sums);
 }
 
-// The sum of a disparity, of those of four in a word of even and of odd ones.
+// The sum for one disparity, from sums packed by even and odd index.
 fn sum_at(even: vec3<u32>, odd: vec3<u32>, at: u32) -> i32 {
     let pair = select(odd, even, at % 2u == 0u)[at / 4u];
     return i32((pair >> (16u * (at % 4u / 2u))) & 0xffffu);
 }
 
-// The disparity of a pixel of half the size, from the costs of its neighbourhood.
+// The disparity of a half-size pixel, from the costs of its neighbourhood.
 @compute @workgroup_size(GROUP)
 fn fit(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -113,7 +113,7 @@ fn fit(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index)
     let x = i32(id.x);
     let y = i32(params.band.first_row + id.y);
     let label = i32(optima[u32(y - top) * pitch + id.x].x & 0xffffu);
-    // Sums of the first and third of each four, in 16 bits each, and of the second and fourth.
+    // Packed 16-bit sums: those of the first and third cost of every four, and of the second and fourth.
     var even = vec3<u32>();
     var odd = vec3<u32>();
     for (var v = max(y - 1, 0); v <= min(y + 1, i32(params.level.height) - 1); v++) {
@@ -123,7 +123,7 @@ fn fit(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index)
             if abs(above) <= 1 {
                 let at = 4u * row + u32(u);
                 var costs = vec3(block_costs[at], block_costs[at + pitch], block_costs[at + 2u * pitch]);
-                // Two disparities further for each label.
+                // Shift by two disparities per label.
                 if above >= 0 {
                     let next = vec3(costs.yz, block_costs[at + 3u * pitch]);
                     costs = select((costs >> vec3(16u)) | (next << vec3(16u)), next, above == 1);
@@ -153,7 +153,7 @@ fn fit(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index)
     let slope = max(below, above) - least;
     var offset = 0;
     if slope > 0 {
-        // A pixel is added first, so the dividend is not negative and the quotient rounds towards minus infinity.
+        // Adding one pixel first makes the dividend non-negative, so that the quotient rounds down.
         let most = 2 * slope;
         let difference = clamp(below - above, -most, most);
         offset = (FRACTION * (difference + most) + slope) / most - FRACTION;

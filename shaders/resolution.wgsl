@@ -1,6 +1,6 @@
 // Messages of the resolution factors between a level and the next finer one, in both directions. One
-// invocation per coarse pixel; a vector holds one value for each of its up to 2 x 2 children, in raster
-// order. Where no label agrees, sums are infinite: the largest value, at which they saturate.
+// invocation per coarse pixel; vectors have one value for each of up to 2 x 2 children, in raster order. If
+// no label agrees, sums are infinite: the largest value, at which they saturate.
 
 #import band volume windows messages sections
 
@@ -12,7 +12,7 @@ struct Params {
     label_offset: i32,
     // Cost of disagreement.
     tau: u32,
-    // Where the volumes of the finer level begin in what is bound, in quads.
+    // Offset of the volumes of the finer level in the bindings, in quads.
     fine_at: u32,
 }
 
@@ -27,23 +27,23 @@ struct Params {
 var<private> children_at: vec4<u32>;
 var<private> exists: vec4<bool>;
 var<private> parent_at: u32;
-// Where truncation is absolute, the minimum of each message to the factor.
+// The minimum of each message to the factor, for absolute truncation.
 var<private> child_floor: vec4<u32>;
 var<private> parent_floor: u32;
 
-// The words that were read last, of several labels each: beliefs less messages.
+// The last words read, with several labels each: beliefs minus messages.
 var<private> child_word: u32;
 var<private> children: vec4<u32>;
 var<private> parent_word: u32;
 var<private> parent: u32;
 
-// Forgets them.
+// Invalidates the last words read.
 fn rewind() {
     child_word = 0xffffffffu;
     parent_word = 0xffffffffu;
 }
 
-// The values of a word of beliefs less those of a word of messages, none of which is larger; infinite where the belief is.
+// The values of a word of beliefs minus those of a word of messages, which are never larger; infinite where the belief is.
 fn less(beliefs: u32, messages: u32) -> u32 {
     let highest = TOPS & beliefs & ((beliefs & ~TOPS) + BOTTOMS);
     return beliefs - (messages & ~((highest >> (BITS - 1u)) * MOST));
@@ -53,7 +53,7 @@ fn less(beliefs: u32, messages: u32) -> u32 {
 const BOTTOMS: u32 = 0xffffffffu / MOST;
 const TOPS: u32 = BOTTOMS << (BITS - 1u);
 
-// The children's messages to the factor for the fine label with this index.
+// The children's messages to the factor for the fine label `index`.
 fn from_children(index: i32) -> vec4<u32> {
     if index < 0 || index >= i32(params.fine.labels) {
         return vec4(MOST);
@@ -80,11 +80,11 @@ fn from_parent(label: u32) -> u32 {
     return select(max(q, parent_floor) - parent_floor, MOST, q == MOST);
 }
 
-// One step over the coarse labels: sums to the parent and to the children for the label with index z.
+// Results of one step over the coarse labels: sums to the parent and to the children for label z.
 struct Sums {
     parent: u32,
     children: vec4<u32>,
-    // Whether the parent has the label, and which children have one that agrees with it.
+    // Whether the parent has the label, and whether each child has a label that agrees with it.
     parent_has: bool,
     children_have: vec4<bool>,
 }
@@ -180,7 +180,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     // The children share a window.
     let own = ends(window_of(id.x, params.band.first_row + id.y));
     let theirs = ends(fine_windows[window_place(fine, x, 2u * params.band.first_row + y)]);
-    // All coarse labels that either window needs, from a whole word on, of which the fine labels start a word too.
+    // All coarse labels that either window needs, aligned so that coarse and fine labels start at whole words.
     let start = min(own.x, theirs.x / 8u * 4u);
     let end = max(own.y, theirs.y / 2u + 1u);
     rewind();
@@ -199,7 +199,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         rewind();
     }
 
-    // The smallest sums, over the labels that the pixel has.
+    // The smallest sums over the labels that the pixel has.
     var least_up = MOST;
     var least_down = vec4(MOST);
     let before = 2 * i32(start) + params.label_offset - 1;

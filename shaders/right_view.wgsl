@@ -1,5 +1,4 @@
-// The label map of the right view, read from the same beliefs in the given columns. One invocation per right
-// pixel.
+// Labels of the right view, from beliefs of the left view in the given columns. One invocation per right pixel.
 
 #import band volume messages
 
@@ -23,7 +22,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
     let row = id.y * params.level.pitch * QUAD_WORDS;
-    // Left pixel x + low + j sees this pixel at label j.
+    // Left pixel x + low + j projects to this pixel at label j.
     let shift = i32(id.x) + params.level.low;
     let first = i32(params.first_column);
     let start = max(first - shift, 0);

@@ -1,28 +1,28 @@
-// Flags pixels whose runner-up is as good as the optimum, and those of small regions of the others: `runs`, then `join` and `flatten` alternately, then `count` and `flag`.
+// Flags ties, and small regions of the other pixels: `runs`, then `join` and `flatten` alternately, then `count` and `flag`.
 //
-// Regions are found by union-find (after Playne and Hawick 2018). Every pixel of a region points at a smaller
-// position in it, down to the root, which points at itself. First the segments of each row get their runs.
-// Then the segments of a row are joined, and then ever larger blocks of rows. Between these steps all
-// pointers are flattened, so that they point at their roots directly. One step joins a few blocks along their
-// borders, so a chain never gets longer than these have pixels on both sides. This bounds the loops.
+// Regions are found by union-find (after Playne and Hawick 2018). Every pixel of a region points to a smaller
+// position in it; the root points to itself. First the segments of each row are divided into runs. Then the
+// segments of a row are joined, then ever larger blocks of rows. After each step all pointers are flattened,
+// to point directly to their roots. A step joins a few blocks along their borders, so chains are no longer
+// than the pixels on both sides, which bounds the loops.
 //
-// Positions count from the first row that the stage sees: the band, and around it as many rows as the height
-// at which a region is certainly large enough.
+// Positions count from the first row that the stage reads: the band, and as many rows around it as make a
+// region large.
 
 #import band maps
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // Rows around the band that the stage sees.
+    // Rows around the band that the stage reads.
     halo: u32,
-    // Rows of the blocks that are joined, or 0 to join the segments of each row; how many of them become one; and
+    // Rows per block to join, or 0 to join the segments of each row; number of blocks that become one; and
     // the columns to join them in.
     span: u32,
     blocks: u32,
     first_column: u32,
     columns: u32,
-    // Regions of fewer pixels are small.
+    // Regions with fewer pixels are small.
     size: u32,
 }
 
@@ -32,13 +32,13 @@ struct Params {
 @group(0) @binding(1) var<storage, read> optima: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read_write> flags: array<u32>;
 @group(0) @binding(3) var<storage, read_write> parents: array<atomic<u32>>;
-// The length of a run at its first pixel, elsewhere 0; at the end, at each root, the pixels of its region.
+// The length of a run at its first pixel, elsewhere 0; finally the number of pixels of a region at its root.
 @group(0) @binding(4) var<storage, read_write> sizes: array<atomic<u32>>;
 
-// A pixel that is in no region.
+// Parent of pixels without a region.
 const NOWHERE: u32 = 0xffffffffu;
 
-// Whether nothing tells the best label from the runner-up.
+// Whether the runner-up is as good as the best label.
 fn tie(at: u32) -> bool {
     return optima[at].x >> 16u == optima[at].y;
 }
@@ -74,7 +74,7 @@ fn runs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
 }
 
-// The root of the region that holds the pixel at `start`.
+// The root of the region that contains the pixel at `start`.
 fn root(start: u32) -> u32 {
     var here = start;
     var next = atomicLoad(&parents[here]);
@@ -85,7 +85,7 @@ fn root(start: u32) -> u32 {
     return here;
 }
 
-// Whether two neighbours belong to the same region.
+// Whether two neighbours belong to one region.
 fn connected(a: u32, b: u32) -> bool {
     if atomicLoad(&parents[a]) == NOWHERE || atomicLoad(&parents[b]) == NOWHERE {
         return false;
@@ -93,14 +93,14 @@ fn connected(a: u32, b: u32) -> bool {
     return abs(i32(optima[a].x & 0xffffu) - i32(optima[b].x & 0xffffu)) <= 1;
 }
 
-// Joins the regions on the two sides of borders: between the segments of a row, or between blocks of rows.
-// One invocation per pixel at such a border.
+// Joins the regions on both sides of borders: between segments of a row, or between blocks of rows. One
+// invocation per pixel at a border.
 @compute @workgroup_size(GROUP)
 fn join(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
     let across = params.span == 0u;
     let x = select(params.first_column + id.x, SEGMENT * (id.x + 1u), across);
-    // One border less than there are blocks.
+    // There is one border less than blocks.
     let block = id.y / (params.blocks - 1u) * params.blocks + id.y % (params.blocks - 1u) + 1u;
     let y = select(params.span * block, id.y, across);
     if x >= params.level.width || y >= params.band.rows || (!across && id.x >= params.columns) {
@@ -111,7 +111,7 @@ fn join(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if !connected(here, other) {
         return;
     }
-    // Where the previous pixels are joined in the same way, their invocation joins these too.
+    // If the previous pixels are connected in the same way, their invocation joins these too.
     if !across && id.x > 0u
         && atomicLoad(&parents[here - 1u]) == atomicLoad(&parents[here])
         && atomicLoad(&parents[other - 1u]) == atomicLoad(&parents[other])
@@ -127,13 +127,13 @@ fn join(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         if before == larger {
             return;
         }
-        // Another invocation has set a parent meanwhile: these two belong together as well.
+        // Another invocation has changed the parent: these two belong together as well.
         a = root(before);
         b = root(smaller);
     }
 }
 
-// Makes every pixel point at its root. One invocation per pixel.
+// Points every pixel to its root. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn flatten(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -143,8 +143,7 @@ fn flatten(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     let start = id.y * params.level.pixel_pitch + id.x;
     let parent = atomicLoad(&parents[start]);
     if parent != NOWHERE {
-        // Roots stay roots meanwhile, so another invocation reaches the root through the old pointer or the
-        // new one.
+        // Roots stay roots, so other invocations reach the root by the old or the new pointer.
         atomicStore(&parents[start], root(parent));
     }
 }
@@ -158,7 +157,7 @@ fn count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     }
     let here = id.y * params.level.pixel_pitch + id.x;
     let to = atomicLoad(&parents[here]);
-    // Roots begin a run and already have its length; other runs are added to them.
+    // Roots start a run and already have its length; other runs are added to them.
     if to != NOWHERE && to != here {
         let length = atomicLoad(&sizes[here]);
         if length > 0u {

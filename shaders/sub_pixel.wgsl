@@ -1,4 +1,4 @@
-// Every pixel's disparity: its label, and the sub-pixel offset from the matching costs around it. One
+// Every pixel's disparity: its label plus the sub-pixel offset from the matching costs around it. One
 // invocation per pixel.
 
 #import band volume maps
@@ -30,11 +30,11 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let label = i32(optima[u32(y - top) * pitch + id.x].x & 0xffffu);
     var offset = 0;
     if params.is_on == 1u && label > 0 && label + 1 < i32(params.level.labels) {
-        // The costs at the label below, at the label and above are bytes of one word, or of two. Where it is
-        // one, the other is the same, and what its shift adds is cut off.
+        // The costs at the label below, at the label and above are bytes of one word, or of two. In one word,
+        // `high` is the same word, and its shifted bits are masked.
         let first = u32(label - 1);
         let shift = 8u * (first % 4u);
-        // Below and above, in 16 bits each, and at the label.
+        // Sums below and above in 16 bits each, and sum at the label.
         var outer = 0u;
         var inner = 0u;
         for (var v = max(y - 1, 0); v <= min(y + 1, i32(params.level.height) - 1); v++) {
@@ -51,8 +51,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let sums = vec3(i32(outer & 0xffffu), i32(inner), i32(outer >> 16u));
         let slope = max(sums.x, sums.z) - sums.y;
         if slope > 0 {
-            // A pixel is added first, so the dividend is not negative and the quotient rounds towards minus
-            // infinity.
+            // Adding one pixel first makes the dividend non-negative, so that the quotient rounds down.
             let most = 2 * slope;
             let difference = clamp(sums.x - sums.z, -most, most);
             offset = (FRACTION * (difference + most) + slope) / most - FRACTION;

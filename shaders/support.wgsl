@@ -1,4 +1,4 @@
-// The confidence of every pixel, from the pixels around it that have nearly its disparity. One invocation per pixel.
+// The support of every pixel by those around it with nearly its disparity. One invocation per pixel.
 
 #import band maps
 
@@ -13,10 +13,10 @@ struct Params {
 @group(0) @binding(2) var<storage, read> flags: array<u32>;
 @group(0) @binding(3) var<storage, read_write> next_flags: array<u32>;
 
-// From the middle to the farthest place.
+// Distance from the middle to the farthest place.
 const REACH: u32 = STEP * (PLACES / 2u);
 
-// The row or column of a place around `middle`, by its index, or the nearest of the `count` that there are.
+// The row or column of a place around `middle` by its index, clamped to `count`.
 fn inside(middle: u32, index: u32, count: u32) -> u32 {
     return min(max(middle + STEP * index, REACH) - REACH, count - 1u);
 }

@@ -1,12 +1,12 @@
-// The right view in place of the left one, both mirrored. One invocation a pixel of the left half and its mirror image; `full` for
-// the views at full size, whose rows are twice as many.
+// Exchanges and mirrors the views. One invocation per pixel of the left half and its mirror image; `full` is
+// for the full-size views, which have twice as many rows.
 
 #import band
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // Elements in a row of the full size.
+    // Elements per full-size row.
     full_pitch: u32,
 }
 

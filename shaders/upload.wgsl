@@ -1,4 +1,4 @@
-// The pixels of both views from words of 8 bits a channel. One invocation per pixel.
+// Unpacks the pixels of both views from words with 8 bits per channel. One invocation per pixel.
 
 #import band
 

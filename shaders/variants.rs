@@ -1,5 +1,5 @@
-//! Every variant of every shader, found by trying the options: for the tests of the shaders, and for what `scripts/isa` and
-//! `scripts/check-wgsl` run.
+//! Every variant of every shader, by trying all options: for tests of shaders, `scripts/isa` and
+//! `scripts/check-wgsl`.
 
 use mrfgs::low_level::backend::Stage;
 use mrfgs::low_level::backend::gpu;
@@ -7,7 +7,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{DisparityRange, GROUPS, Key, Method, PRESETS, Takes};
 use std::collections::HashSet;
 
-/// Values of an option: all of them, or of numbers the ends, and of real ones some between.
+/// Values of an option: all words, the ends of whole numbers, and five values of real numbers.
 fn values(key: &Key) -> Vec<String> {
     match key.takes {
         Takes::Switch => vec!["false".into(), "true".into()],
@@ -19,8 +19,8 @@ fn values(key: &Key) -> Vec<String> {
     }
 }
 
-/// A plan for every preset, the default first, and for every change of one or two options of it. The constants of a kernel
-/// follow from few options each, so that these need all variants.
+/// A plan for every preset, the default first, and for every change of one or two of its options. The
+/// constants of a kernel depend on few options each, so this covers all variants.
 pub(crate) fn plans() -> Vec<Plan> {
     let keys = GROUPS.iter().flat_map(|group| group.keys);
     let changes: Vec<(String, String)> =
@@ -35,7 +35,7 @@ pub(crate) fn plans() -> Vec<Plan> {
         for (i, (key, value)) in changes.iter().enumerate() {
             for (other, other_value) in &changes[i..] {
                 let mut method = preset.clone();
-                // Not every two values go together.
+                // Some values cannot be combined.
                 if method.set_all([(&**key, &**value), (&**other, &**other_value)]).is_ok() {
                     add(&method);
                 }
@@ -45,7 +45,7 @@ pub(crate) fn plans() -> Vec<Plan> {
     plans
 }
 
-/// Every kernel of `plans`, each shader once.
+/// The kernels of `plans`, each shader once.
 pub(crate) fn kernels(plans: &[Plan]) -> Vec<gpu::Kernel> {
     let mut seen = HashSet::new();
     let kernels = plans.iter().flat_map(|plan| {

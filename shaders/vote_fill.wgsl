@@ -1,5 +1,5 @@
-// Votes of valid pixels on what filled and doubtful ones show, over half-size pixels and every second label. `show` and `halve` prepare.
-// Then, for one band of half-size rows after the other, `own_votes`, `sum_rows`, `sum_columns` and `elect`. At the end `take`.
+// Votes of valid pixels for filled and doubtful ones, over half-size pixels and every second label. `show` and `halve` prepare. Then
+// `own_votes`, `sum_rows`, `sum_columns` and `elect` run for each band of half-size rows, and finally `take`.
 
 #import band image maps
 
@@ -8,14 +8,14 @@ struct Params {
     @align(16) band: Band,
     half_width: u32,
     half_height: u32,
-    // Words in a row of half-size pixels, and of the sums.
+    // Words per row of half-size pixels, and of the sums.
     half_pitch: u32,
     sum_pitch: u32,
-    // Labels that are voted for.
+    // Number of labels that are voted for.
     labels: u32,
-    // 1 where smaller labels are nearer, else 0.
+    // 1 if smaller labels are nearer, else 0.
     smaller_is_nearer: u32,
-    // First rows of half-size pixels that are bound, of the sums along rows and of the votes.
+    // First bound rows of half-size pixels, of the sums along rows and of the votes.
     first_summed: u32,
     first_voted: u32,
 }
@@ -26,15 +26,15 @@ struct Params {
 // label | best << 16, runner-up.
 @group(0) @binding(3) var<storage, read> optima: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> disparity: array<i32>;
-// What the right view sees: how near it is, from 1 on; 0 where nothing is known.
+// Nearness, from 1 on, of the label at each pixel of the right view; 0 where none is known.
 @group(0) @binding(5) var<storage, read_write> shown: array<atomic<u32>>;
-// Half-size pixels: red | green << 8 | blue << 16, and ASKED where a pixel may take the vote.
+// Half-size pixels: red | green << 8 | blue << 16, and ASKED if their vote is needed.
 @group(0) @binding(6) var<storage, read_write> half_colours: array<u32>;
-// By row, half-size pixel and label: own votes, then their sums along the row.
+// By row, half-size pixel and label: votes, then their sums along the row.
 @group(0) @binding(7) var<storage, read_write> sums: array<u32>;
-// The same, summed along columns.
+// The sums along columns.
 @group(0) @binding(8) var<storage, read_write> totals: array<u32>;
-// Votes in 1/256 px, NONE where there is none.
+// Votes in 1/256 px, or NONE.
 @group(0) @binding(9) var<storage, read_write> elected: array<i32>;
 // Weights of steps along a row, then along a column, by the difference in colour.
 @group(0) @binding(10) var<storage, read> vote_weights: array<u32>;
@@ -42,22 +42,22 @@ struct Params {
 const ASKED: u32 = 0x1000000u;
 const NONE: i32 = -0x7fffffff;
 
-// Whether a pixel with such flags shows something for sure.
+// Whether a pixel with these flags is sure.
 fn is_sure(flags: u32) -> bool {
     return is_valid(flags) && ((flags >> 8u) & 0xffu) >= VOTE_SURE;
 }
 
-// Whether such a pixel may be outvoted.
+// Whether a pixel with these flags may be outvoted.
 fn may_be_outvoted(flags: u32) -> bool {
     return is_valid(flags) && !is_sure(flags);
 }
 
-// How near the surface of a label is.
+// Nearness of the surface of a label.
 fn near(label: u32) -> u32 {
     return select(label, params.level.labels - 1u - label, params.smaller_is_nearer == 1u);
 }
 
-// Column of the right view that label `label` leads to from column x.
+// Column of the right view to which label `label` projects from column x.
 fn column(x: u32, label: u32) -> i32 {
     return i32(x) - params.level.low - i32(label);
 }
@@ -66,7 +66,7 @@ fn is_inside(column: i32) -> bool {
     return column >= 0 && column < i32(params.level.width);
 }
 
-// Colour of a pixel in 8 bits.
+// 8-bit colour of a pixel.
 fn colour(at: u32) -> vec3<u32> {
     return channels(left[at]) >> vec3(8u);
 }
@@ -81,7 +81,7 @@ fn weighted(weight: u32, sum: u32) -> u32 {
     return (sum >> 16u) * weight + (((sum & 0xffffu) * weight) >> 16u);
 }
 
-// What the right view sees by the sure pixels, in maps of 0. One invocation per pixel.
+// The labels that sure pixels show in the right view, in zeroed maps. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn show(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -98,8 +98,8 @@ fn show(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
 }
 
-// Colours of half-size pixels, and whether they are asked. One invocation per half-size pixel; what is bound of the image begins
-// two rows above the band, where there are so many.
+// Colours of half-size pixels, and whether their votes are needed. One invocation per half-size pixel; the
+// bound rows of the image start up to two rows above the band.
 @compute @workgroup_size(GROUP)
 fn halve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -136,7 +136,7 @@ fn halve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     half_colours[id.y * params.half_pitch + id.x] = packed(mean) | asked;
 }
 
-// Own votes. One invocation per half-size pixel and label.
+// Votes of each half-size pixel. One invocation per half-size pixel and label.
 @compute @workgroup_size(GROUP)
 fn own_votes(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -168,7 +168,7 @@ fn own_votes(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     sums[id.y * params.sum_pitch + id.x] = sum << VOTE_FRACTION_BITS;
 }
 
-// Sums own votes along rows. One invocation per row and label.
+// Sums votes along rows. One invocation per row and label.
 @compute @workgroup_size(GROUP)
 fn sum_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -204,7 +204,7 @@ fn step_weight(x: u32, a: u32, b: u32) -> u32 {
     return vote_weights[COLOUR_DIFFERENCES + difference(one, other)];
 }
 
-// Sums along columns, for the half-size pixels that are asked. One invocation per half-size pixel and label.
+// Sums along columns, where votes are needed. One invocation per half-size pixel and label.
 @compute @workgroup_size(GROUP)
 fn sum_columns(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -267,15 +267,15 @@ fn elect(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
         above >>= halvings;
         let slope = max(below, above);
         if slope > 0u {
-            // With the slope added, nothing is negative, and the quotient is 256 larger.
+            // Adding the slope first makes the dividend non-negative and the quotient larger by 256.
             offset = i32((512u * (below + slope - above) + slope) / (2u * slope)) - 256;
         }
     }
     elected[here] = FRACTION * (params.level.low + 2 * i32(best)) + offset;
 }
 
-// Filled pixels take the vote of the half-size pixel around that looks most alike, and outvoted ones that of their own. One invocation
-// per pixel.
+// Filled pixels take the vote of the most similar half-size pixel around them, outvoted ones that of their
+// own. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);

@@ -1,5 +1,5 @@
-//! Writes every variant of every shader to a folder, `NUMBER.STAGE.ENTRY-POINT.wgsl` each:
-//! `cargo run --example write-shaders FOLDER`.
+//! Writes every variant of every shader to a folder, as `NUMBER.STAGE.ENTRY-POINT.wgsl`: `cargo run --example
+//! write-shaders FOLDER`.
 
 mod variants;
 

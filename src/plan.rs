@@ -1,13 +1,13 @@
-//! Everything about a match that is known before it runs: levels, integer parameters, bounds, memory.
+//! All properties of a match that are known before it runs: levels, integer parameters, bounds, memory.
 //!
-//! A plan is pure: it depends on the image size, the disparity range and the [`Method`] alone. It is
-//! therefore the same on every machine, can be tested without a device, and is what `--dry-run` prints.
+//! A plan depends only on the image size, the disparity range and the [`Method`]. It is the same on every
+//! machine, can be tested without a device, and is the output of `--dry-run`.
 //!
 //! # Units
-//! Messages, evidence and beliefs are costs, the -log of the paper's probabilities, in [`UNITS_PER_NAT`]
+//! Messages, evidence and beliefs are costs: the -log of the paper's probabilities, in [`UNITS_PER_NAT`]
 //! units per nat. All are non-negative integers, and the minimum of every message over the labels is 0. They
-//! and their sums are stored in 8 bits, or in 16 where the method needs them ([`VolumeWidth`]). Sums
-//! saturate; a label whose cost saturates is no longer a candidate, so its exact cost does not matter.
+//! and their sums are stored in 8 bits, or in 16 if the method needs them ([`VolumeWidth`]). Sums saturate; a
+//! label whose cost saturates is no longer a candidate, so its exact cost does not matter.
 
 mod arithmetic;
 pub mod patches;
@@ -26,23 +26,23 @@ pub use arithmetic::{EvidenceScale, HARD_CAP, Truncation, TruncationRule, UNITS_
 
 /// Largest matching cost at level 0, in cost units.
 pub const COST_MAX: u8 = 254;
-/// Cost units of each census bit that differs.
+/// Cost units per differing census bit.
 pub const CENSUS_BIT_COST: u32 = 4;
 /// Largest number of differing census bits that counts.
 pub const CENSUS_BITS: u32 = 40;
 /// Truncation of the colour difference, in 8-bit levels summed over the channels.
 pub const COLOUR_MOST: u32 = 64;
-/// Horizontal radius of the window of census and contrast, which is 9 x 7.
+/// Horizontal radius of the 9 x 7 window of census and contrast.
 pub const CENSUS_RADIUS_X: u32 = 4;
-/// Vertical radius of that window.
+/// Vertical radius of the window of census and contrast.
 pub const CENSUS_RADIUS_Y: u32 = 3;
-/// Number of pixels in that window.
+/// Number of pixels in the window of census and contrast.
 pub const CENSUS_PLACES: u32 = (2 * CENSUS_RADIUS_X + 1) * (2 * CENSUS_RADIUS_Y + 1);
 /// Fractional bits of the costs of level 1 and coarser.
 pub const COST_FRACTION_BITS: u32 = 8;
-/// Rows that a device keeps together where it holds only some of level 0 at a time.
+/// Rows per part of the ring on a device that holds only some rows of level 0 at a time.
 pub const RING_PART: usize = 32;
-/// Rows of all that a device holds begin at multiples of this many bytes, as its bindings do.
+/// Rows on a device start at multiples of this many bytes, like bindings.
 pub const ROW_ALIGN: usize = 256;
 /// Side of the window that holds a dependency factor's members.
 pub const GRAPH_WINDOW: usize = 7;
@@ -52,14 +52,14 @@ pub const LABEL_BLOCK: usize = 16;
 pub const WINDOW_RUN: usize = 8;
 /// The first label of a label window is a multiple of this.
 pub const WINDOW_STEP: usize = 4;
-/// How far above a pixel's smallest belief a label may be and still count as a candidate, in units: 2 nats.
+/// Candidates are labels at most this far above the pixel's smallest belief, in units: 2 nats.
 pub const WINDOW_SLACK: u16 = 8;
-/// How far from its own coarse pixels a label window looks for candidates, in coarse pixels.
+/// Radius of the search for candidates around a label window's coarse pixels, in coarse pixels.
 pub const WINDOW_REACH: usize = 2;
-/// Labels that a label window holds at least on either side of each candidate.
+/// Minimum number of labels in a window on either side of each candidate.
 pub const WINDOW_MARGIN: i32 = 2;
 
-// The largest costs of a label match what the options state.
+// The largest costs of a label agree with the facts in the options.
 const _: () = {
     let (sad, ad_census) = (MatchingCost::Sad.facts(), MatchingCost::AdCensus.facts());
     assert!((sad.most * sad.units) as u32 == COST_MAX as u32);
@@ -110,7 +110,7 @@ impl LevelPlan {
         self.min + self.labels as i32 - 1
     }
 
-    /// Label windows of the level: those of a row, and rows of them.
+    /// (windows per row, rows of windows).
     #[must_use]
     pub fn windows(&self) -> (usize, usize) {
         (self.width.div_ceil(WINDOW_RUN), self.height.div_ceil(2))
@@ -126,7 +126,7 @@ pub struct Phase {
     pub iterations: u32,
 }
 
-/// What is searched in a pair at its full size, where it is matched at half of that.
+/// The full size and range of a pair that is matched at half its size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FullSize {
     /// (width, height) of both views, in pixels.
@@ -135,14 +135,14 @@ pub struct FullSize {
     pub range: DisparityRange,
 }
 
-/// Everything about a match that is known before it runs.
+/// All properties of a match that are known before it runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// The method.
     pub method: Method,
     /// The disparities to search, at the size of the finest level.
     pub range: DisparityRange,
-    /// The size of the pair and its range, where the finest level has half of that.
+    /// The full size and range of the pair, if it is matched at half its size.
     pub full: Option<FullSize>,
     /// All levels, finest first.
     pub levels: Vec<LevelPlan>,
@@ -158,22 +158,20 @@ pub struct Plan {
     pub volume_width: VolumeWidth,
     /// The phases of message passing, in order.
     pub phases: Vec<Phase>,
-    /// Columns of the left view from which the right view is
-    /// computed: all of them, or in a tile those of its core.
+    /// Columns of the left view that the right view is computed from: all, or those of the core of a tile.
     pub core: Range<usize>,
-    /// Rows of level 0 that are held at the same time: all of them, or as many as the stages that go down the image
-    /// together need.
+    /// Number of rows of level 0 held at the same time: all, or as many as the stages that run together need.
     pub held: usize,
-    /// Whether the costs of level 0 are held whole, where its other volumes are not.
+    /// Whether all costs of level 0 are held, even if its other volumes are not.
     pub holds_costs: bool,
-    /// Memory that the match may take, in MiB: that of the method, or for a tile what is left of it.
+    /// Memory for the match, in MiB: the limit of the method, or the rest of it that a tile may use.
     pub memory: u32,
-    /// Whether a backend gives what is never needed at the same time the same memory.
+    /// Whether data that are never needed at the same time share memory.
     pub shares: bool,
 }
 
 impl Plan {
-    /// The plan for images of `width` x `height` pixels. Where the method matches at half their size, that of the levels is half.
+    /// The plan for images of `width` x `height` pixels. If the method matches at half their size, so are the levels.
     ///
     /// # Errors
     /// [`crate::Error::Option`] when an option of the method is out of range.
@@ -209,7 +207,7 @@ impl Plan {
         }
 
         let window = GRAPH_WINDOW * GRAPH_WINDOW;
-        // The tolerance makes sure that 48 (1 - 75 / 100) is 12, whatever the last bit of the product.
+        // The tolerance makes 48 (1 - 75 / 100) equal 12, regardless of rounding.
         let neighbours = (((window - 1) as f64 * (100.0 - method.graph.percentile) / 100.0) - 1e-9)
             .ceil()
             .max(0.0) as usize;
@@ -220,8 +218,7 @@ impl Plan {
         };
         let (dependency, resolution) =
             (cut(method.messages.dependency_truncation), cut(method.messages.resolution_truncation));
-        // A pixel is, on average, in as many factors as a factor has members. For such a pixel nothing may
-        // saturate.
+        // On average, a pixel is in as many factors as a factor has members. Such a pixel must not saturate.
         let usual = u32::from(levels[0].evidence.cap)
             + (neighbours + 1) as u32 * u32::from(dependency.tau)
             + 2 * u32::from(resolution.tau);
@@ -262,17 +259,17 @@ impl Plan {
         })
     }
 
-    /// The plan for the same pair at twice its size, where the method asks for a match there, too.
+    /// The plan for the same pair at twice its size, if the method also matches there.
     ///
     /// # Errors
-    /// [`crate::Error::Range`] when so many labels do not fit.
+    /// [`crate::Error::Range`] if there are too many labels.
     pub fn doubled(&self) -> Result<Option<Self>> {
         let Some(method) = self.method.at_double_size() else { return Ok(None) };
         let (width, height) = self.size();
         Self::new(2 * width, 2 * height, self.range.doubled()?, &method).map(Some)
     }
 
-    /// (width, height) of the pair, and the disparities to search in it.
+    /// Size and disparity range of the pair.
     #[must_use]
     pub fn of_pair(&self) -> FullSize {
         self.full.unwrap_or(FullSize { size: self.size(), range: self.range })
@@ -290,14 +287,14 @@ impl Plan {
         plan
     }
 
-    /// This plan where the method may take so many MiB.
+    /// This plan with a memory limit of `memory` MiB.
     pub(crate) fn granted(&self, memory: u32) -> Self {
         let mut plan = Self { memory, ..self.clone() };
         plan.method.tiles.memory = memory;
         plan
     }
 
-    /// Whether a match by this plan fits the buffers of `other`: the two may differ in [`Plan::core`] only.
+    /// Whether a match by this plan can use the buffers of `other`: they may differ only in [`Plan::core`].
     #[must_use]
     pub fn fits(&self, other: &Self) -> bool {
         *self == Self { core: self.core.clone(), ..other.clone() }
@@ -309,7 +306,7 @@ impl Plan {
         if level == 0 { self.held } else { self.levels[level].height }
     }
 
-    /// The same plan with all rows held.
+    /// This plan with all rows held.
     #[must_use]
     pub fn whole(&self) -> Self {
         Self { held: self.levels[0].height, ..self.clone() }
@@ -321,20 +318,20 @@ impl Plan {
         self.held == self.levels[0].height
     }
 
-    /// Whether all costs of level 0 are stored, and not computed where they are read.
+    /// Whether all costs of level 0 are stored, not computed where they are read.
     #[must_use]
     pub fn stores_costs(&self) -> bool {
         self.holds_all_rows() || self.holds_costs
     }
 
-    /// Whether the dependency factors of `level` ever send messages: without, nobody needs its graph.
+    /// Whether the dependency factors of `level` ever send messages; otherwise its graph is not needed.
     #[must_use]
     pub fn floods(&self, level: usize) -> bool {
         self.phases.iter().any(|phase| phase.finest <= level && phase.iterations > 0)
     }
 
-    /// Cost of labels that differ by one in a dependency factor of `level`, in units; `None` where it is that of any other
-    /// disagreement: at the finest level, whose labels are fine enough for one surface, and where the potential is not soft.
+    /// Cost of labels that differ by one in a dependency factor of `level`, in units. `None` if they cost as much as any
+    /// disagreement: at the finest level, whose labels are fine enough for one surface, and if the potential is not soft.
     #[must_use]
     pub fn label_step(&self, level: usize) -> Option<u16> {
         let messages = &self.method.messages;
@@ -354,8 +351,8 @@ impl Plan {
         self.neighbours + 1
     }
 
-    /// The largest belief, at which sums saturate. It is one message below the largest value, so that a
-    /// padding label stays above the belief of every real label even after a message has been subtracted.
+    /// The largest belief, at which sums saturate. It is one message below the largest value, so that padding
+    /// stays above every label even after a message is subtracted.
     #[must_use]
     pub fn belief_most(&self) -> u16 {
         self.volume_width.most() - self.dependency.tau.max(self.resolution.tau)
@@ -367,8 +364,8 @@ impl Plan {
         self.method.front.zone_sigmas > 0.0
     }
 
-    /// The largest sum of squared changes, over all pixels of the finest level, at which its map has settled; `None` where message
-    /// passing goes on anyway.
+    /// The largest sum of squared label changes at the finest level that counts as settled; `None` if message
+    /// passing never stops early.
     #[must_use]
     pub fn settled_change(&self) -> Option<u64> {
         let tolerance = self.method.schedule.tolerance;
@@ -381,7 +378,7 @@ impl Plan {
         self.method.schedule.order == Order::CoarseFirst && level + 1 < self.levels.len()
     }
 
-    /// Whether the labels of the right view are read off the beliefs.
+    /// Whether the labels of the right view are computed from the beliefs.
     #[must_use]
     pub fn reads_right_view(&self) -> bool {
         let refinement = &self.method.refinement;
@@ -398,21 +395,21 @@ impl Plan {
         self.method.cost.matching.facts().colour_weight
     }
 
-    /// The variance of grey (in squared 8-bit levels, times [`CENSUS_PLACES`] squared) from which on colour
-    /// has its full weight.
+    /// The variance of grey (in squared 8-bit levels, times [`CENSUS_PLACES`] squared) above which colour has
+    /// full weight.
     #[must_use]
     pub fn colour_variance(&self) -> u32 {
         let contrast = self.method.cost.colour_contrast;
         (f64::from(CENSUS_PLACES * CENSUS_PLACES) * (contrast * contrast) + 0.5).floor() as u32
     }
 
-    /// Whether the matching cost goes row by row, so that costs can be computed where they are read.
+    /// Whether costs can be computed row by row, where they are read.
     #[must_use]
     pub fn costs_go_by_rows(&self) -> bool {
         self.method.cost.matching.facts().by_rows
     }
 
-    /// Whether the pyramid takes the minimum over d instead of a low-pass.
+    /// Whether the pyramid takes the minimum over disparities instead of a low-pass.
     #[must_use]
     pub fn minimum_over_d(&self) -> bool {
         self.method.cost.pyramid == Pyramid::Minimum
@@ -424,8 +421,8 @@ impl Plan {
         self.method.messages.agreement == Agreement::Interpolating
     }
 
-    /// `2 z_min - d_min` between `level` - 1 and `level`: 0, or -1 where the finer level's smallest label is odd.
-    /// Coarse label index j agrees best with the fine label index 2 j + offset.
+    /// `2 z_min - d_min` between `level` - 1 and `level`: 0, or -1 if the finer level's smallest label is
+    /// odd. Coarse label index j agrees best with the fine label index 2 j + offset.
     #[must_use]
     pub fn label_offset(&self, level: usize) -> i32 {
         2 * self.levels[level].min - self.levels[level - 1].min

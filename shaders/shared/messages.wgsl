@@ -1,14 +1,13 @@
-// Messages and beliefs, in 8 or 16 bits.
+// Messages and beliefs in 8 or 16 bits.
 
 #import volume
 
-// For messages and beliefs: labels per word, words per quad of labels, and the largest value, which stands
-// for infinity.
+// For messages and beliefs: labels per word, words per quad of labels, and the largest value (infinity).
 const PER_WORD: u32 = 32u / BITS;
 const QUAD_WORDS: u32 = 4u / PER_WORD;
 const MOST: u32 = 0xffffffffu >> (32u - BITS);
 
-// The value of a label, from the word that holds it.
+// The value of a label in its word.
 fn pick(word: u32, label: u32) -> u32 {
     return (word >> (BITS * (label % PER_WORD))) & MOST;
 }

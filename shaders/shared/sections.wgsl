@@ -1,10 +1,10 @@
-// A stage that may go over several levels in one dispatch, one section of the workgroups after the other.
+// Stages that may process several levels in one dispatch: the workgroups have a section for each level.
 
 @group(0) @binding(0) var<uniform> sections: array<Params, SECTIONS>;
-// Those of the section that the workgroup belongs to.
+// The parameters of the section that this workgroup belongs to.
 var<private> params: Params;
 
-// Finds them.
+// Loads `params`.
 fn enter(group: vec3<u32>) {
     let linear = group.x + group.y * sections[0].band.grid;
     var section = 0u;

@@ -23,8 +23,8 @@ fn are_labels(quad: u32) -> vec4<bool> {
     return labels_of(quad) < vec4(params.level.labels);
 }
 
-// Position of a pixel's quad in a row. A row of a volume holds the first quad of all its pixels, then their
-// second, and so on; dependency messages hold all quads of one slot, then those of the next. So neighbouring
+// Position of a pixel's quad in a row. A row of a volume has the first quads of all its pixels, then the
+// second ones, and so on; dependency messages have all quads of one slot, then of the next. Thus neighbouring
 // invocations access neighbouring words.
 fn place_of(quad: u32, x: u32) -> u32 {
     return quad * params.level.width + x;

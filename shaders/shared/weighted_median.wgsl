@@ -1,15 +1,15 @@
 // Weighted median of the disparities around every pixel, sampled at regular steps. One invocation per pixel.
 //
 // The result is the smallest value at which half of the weight is reached. An interval that contains it
-// shrinks to an eighth with every pass over the window, which sums the weights below eight thresholds at
-// once. This needs no list, no sort, and only a few registers.
+// shrinks to an eighth with every pass over the window, which sums the weights below eight thresholds. This
+// needs no list, no sorting, and few registers.
 
 #import image maps
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // In steps: a step along a row is 2 to `column_bits` pixels long, one along a column 2 to `row_bits`.
+    // In steps, of 2^`column_bits` pixels along rows and 2^`row_bits` along columns.
     radius: u32,
     column_bits: u32,
     row_bits: u32,
@@ -23,7 +23,7 @@ struct Params {
 @group(0) @binding(1) var<storage, read> left: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> disparity: array<i32>;
 @group(0) @binding(3) var<storage, read> flags: array<u32>;
-// The weight that distance subtracts, by |dy| and |dx|.
+// Weight subtracted for distance, by |dy| and |dx|.
 @group(0) @binding(4) var<storage, read> space: array<u32>;
 @group(0) @binding(5) var<storage, read_write> next_disparity: array<i32>;
 
@@ -41,7 +41,7 @@ fn weight(centre: vec3<u32>, at: u32, away: vec2<u32>) -> u32 {
     return MEDIAN_WEIGHT - min(colour + space[away.y * (params.radius + 1u) + away.x], MEDIAN_WEIGHT);
 }
 
-// How many bits make pixels steps.
+// Step lengths as powers of two, in pixels.
 fn step_bits() -> vec2<u32> {
     return vec2(params.column_bits, params.row_bits);
 }
@@ -53,21 +53,21 @@ fn places(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
 
 // The window of a pixel.
 struct Window {
-    // The pixel, where it is bound, and its guide.
+    // The pixel, its index in the bound rows, and its guide.
     middle: vec2<u32>,
     here: u32,
     centre: vec3<u32>,
-    // The first place, and the end of all places, which are `step` pixels apart. (`start` says where a row begins.)
+    // The first place, the end, and the distance between places in pixels. (`start` returns the start of a row.)
     first: vec2<u32>,
     last: vec2<u32>,
     step: vec2<u32>,
-    // First row that is bound.
+    // First bound row.
     top: u32,
 }
 
 // The window of the pixel in column id.x and row id.y of the band.
 fn window(id: vec2<u32>) -> Window {
-    // The first place lies in the image and on the raster of places.
+    // The first place is inside the image and on the grid of places.
     let raster = step_bits() + vec2(0u, WINDOW_ROW_BITS);
     let reach = vec2(params.radius << raster.x, (params.radius >> WINDOW_ROW_BITS) << raster.y);
     let top = halo_start(params.radius << params.row_bits);
@@ -78,24 +78,24 @@ fn window(id: vec2<u32>) -> Window {
     return Window(middle, here, guide(here), first, last, vec2(EVERY, 1u) << raster, top);
 }
 
-// The column of the first place in row `v` of a window: of all places, or of every second one as on a checkerboard.
+// The column of the first place in row `v` of a window, for all places or a checkerboard of them.
 fn start(w: Window, v: u32) -> u32 {
     let away = (vec2<i32>(vec2(w.first.x, v)) - vec2<i32>(w.middle)) >> step_bits();
     let skipped = u32(away.x + away.y / 2) & (EVERY - 1u);
     return w.first.x + (skipped << params.column_bits);
 }
 
-// Whether the median changes a pixel with such flags.
+// Whether the median changes a pixel with these flags.
 fn touched(flags: u32) -> bool {
     return has_disparity(flags) && (params.all == 1u || (flags & FILLED) != 0u);
 }
 
-// The disparity at `at`, in steps of 2 to `bits`, to the nearest.
+// The disparity at `at` in steps of 2^`bits`, to the nearest.
 fn in_steps(at: u32, bits: u32) -> i32 {
     return (disparity[at] + i32((1u << bits) >> 1u)) >> bits;
 }
 
-// The median in window `w`, in steps of 2 to `bits`; where it changes nothing, the disparity as it is.
+// The median in window `w` in steps of 2^`bits`, or the old disparity if the median does not change the pixel.
 fn median(w: Window, bits: u32) -> i32 {
     let pitch = params.level.pixel_pitch;
     var low = disparity[w.here];
@@ -132,7 +132,7 @@ fn median(w: Window, bits: u32) -> i32 {
                     }
                 }
             }
-            // The interval ends at the first threshold below which half of the weight lies.
+            // The interval ends at the first threshold with half of the weight below it.
             let short = vec4<u32>(2u * below_first < vec4(total));
             let short_second = vec4<u32>(2u * below_second < vec4(total));
             let skipped = short.x + short.y + short.z + short.w

@@ -1,25 +1,24 @@
-// The labels that each pixel has. All others have an infinite belief from the moment the level joins, so stages leave these
-// alone.
+// The labels that each pixel has. All others have infinite beliefs once the level has joined; stages skip them.
 
 #import volume
 
-// Place of the window of the pixel at (x, y) of a level: first label | number of labels with padding << 16.
+// Index of the window of the pixel at (x, y) of a level: first label | number of labels with padding << 16.
 fn window_place(level: Level, x: u32, y: u32) -> u32 {
     return level.windows_at + y / 2u * ((level.width + WINDOW_RUN - 1u) / WINDOW_RUN) + x / WINDOW_RUN;
 }
 
-// That of a pixel of the stage's level.
+// The window of a pixel of the stage's level.
 fn window_of(x: u32, y: u32) -> u32 {
     return windows[window_place(params.level, x, y)];
 }
 
-// The first label of a window, and the one behind its last.
+// (first label, last label + 1) of a window.
 fn ends(window: u32) -> vec2<u32> {
     let first = window & 0xffffu;
     return vec2(first, first + (window >> 16u));
 }
 
-// Its first quad, and the one behind its last: windows consist of whole quads.
+// (first quad, last quad + 1) of a window; windows are whole quads.
 fn quads_of(window: u32) -> vec2<u32> {
     return ends(window) / 4u;
 }

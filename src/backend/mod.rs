@@ -1,6 +1,6 @@
-//! The seam: what every backend can do, stage by stage.
+//! The interface of all backends: they run single stages.
 //!
-//! A backend knows stages, not their order; [`crate::program`] alone knows that. Everything from the matching cost on is integer
+//! Only [`crate::program`] knows the order of stages. From the matching cost on, everything is integer
 //! arithmetic, so all backends give the same bits. The documentation of each [`Stage`] is its definition.
 
 pub mod cpu;
@@ -19,7 +19,7 @@ use probe::Probe;
 use std::pin::Pin;
 use std::time::Duration;
 
-/// What a match asked of a device.
+/// Device work of a match.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
     /// Dispatches.
@@ -28,13 +28,13 @@ pub struct Traffic {
     pub submissions: u64,
     /// Bytes written to the device.
     pub bytes_up: u64,
-    /// Bytes read from it.
+    /// Bytes read from the device.
     pub bytes_down: u64,
-    /// Bytes of the buffers that it holds for the match.
+    /// Bytes of the buffers held for the match.
     pub bytes_held: u64,
 }
 
-/// Of one match after another: what went through adds up, and the most was held.
+/// Counters add up; `bytes_held` keeps the maximum.
 impl std::ops::AddAssign for Traffic {
     fn add_assign(&mut self, more: Self) {
         self.dispatches += more.dispatches;
@@ -45,42 +45,42 @@ impl std::ops::AddAssign for Traffic {
     }
 }
 
-/// Maps that a backend was asked for and that may still be on their way.
+/// Identifies requested maps, which may not have arrived yet.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Ticket(u64);
 
-/// What a backend is asked for, to be awaited. A native program waits for the device there. In a browser, where nobody may wait, the
-/// thread does other work until the answer comes.
+/// The answer of a backend. A native program waits for the device in it. A browser thread, which may not
+/// wait, does other work until the answer arrives.
 pub type Promise<'a, T> = Pin<Box<dyn Future<Output = Result<T>> + 'a>>;
 
-/// What runs the stages. Every method fails with [`crate::Error::Device`] when the device does.
+/// Runs the stages. Every method fails with [`crate::Error::Device`] if the device fails.
 #[allow(clippy::missing_errors_doc, reason = "said once, above")]
 pub trait Backend {
-    /// What runs the stages, for people: "CPU path, 2 threads", "llvmpipe (Vulkan)".
+    /// A readable name: "CPU path, 2 threads", "llvmpipe (Vulkan)".
     fn describe(&self) -> String;
 
-    /// The driver of the device and its version, as far as it says; `None` where there is no device.
+    /// The driver of the device and its version, as far as known; `None` without a device.
     fn driver(&self) -> Option<String> {
         None
     }
 
-    /// Frees what the host holds for the last match alone, so that the next one can be [prepared](crate::front::prepare) in its
-    /// place. No stage runs before [`Self::prepare`] is called again.
+    /// Frees host memory of the last match, so that the next one can be [prepared](crate::front::prepare) in
+    /// its place. No stage may run before [`Self::prepare`] is called again.
     fn release(&mut self) {}
 
-    /// Takes what a match by `plan` needs, gives every pixel all labels, and sets all messages, and the map that [`Stage::Change`] compares with, to 0. All
-    /// that the stages need is allocated here, from the plan alone; a second pair whose plan [fits](Plan::fits) goes into the same
-    /// buffers, and maps stay.
+    /// Loads the input of a match by `plan`, gives every pixel all labels, and sets all messages and the
+    /// previous label map of [`Stage::Change`] to 0. All memory of the stages is allocated here, from the
+    /// plan alone. A pair whose plan [fits](Plan::fits) reuses the buffers; maps stay.
     ///
     /// # Errors
-    /// [`crate::Error::Memory`] and [`crate::Error::Device`] when the buffers cannot be had.
+    /// [`crate::Error::Memory`] and [`crate::Error::Device`] if the buffers cannot be allocated.
     fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()>;
 
-    /// The same match as this backend runs it: which rows of level 0 it holds, and which stages go together.
+    /// Adapts a program to this backend: the rows of level 0 held, and the stages run together.
     fn fit(&mut self, program: Program) -> Program;
 
-    /// Runs a stage, as a list says. Devices may still be at it when this returns. What the rows of a part leave of level 0 beside
-    /// maps may be gone afterwards.
+    /// Runs a stage. A device may still be working when this returns. After a band of rows, data of level 0
+    /// other than maps may be overwritten.
     fn perform(&mut self, run: &Run) -> Result<()>;
 
     /// Runs a stage on all rows of its level.
@@ -88,54 +88,55 @@ pub trait Backend {
         self.perform(&stage.into())
     }
 
-    /// Frees what nobody needs any more of the match, where that is memory of the host.
+    /// Frees host memory of data that are no longer needed.
     fn free(&mut self, _: Data) {}
 
-    /// To be awaited between stages: until a device is no more than a few submissions behind, and in a browser until the other work
-    /// of the thread has had its turn.
+    /// To be awaited between stages: until the device is at most a few submissions behind, and in a browser
+    /// until other tasks of the thread have run.
     fn keep_up(&mut self) -> Promise<'_, ()>;
 
-    /// Whether [`Stage::Change`] has found that the map has settled. A device returns false unless it is to `wait` or takes
-    /// times, since an answer takes waiting; once the map has settled, it skips the messages of further iterations.
+    /// Whether [`Stage::Change`] has found that the map has settled. A device returns false unless `wait` is set or times
+    /// are taken, because an answer requires waiting; once the map has settled, it skips the messages of further
+    /// iterations.
     fn settled(&mut self, wait: bool) -> Promise<'_, bool>;
 
-    /// How many iterations found the map settled already.
+    /// Number of iterations that ran after the map had settled.
     fn idle_iterations(&mut self) -> Promise<'_, u32>;
 
-    /// Waits until every stage has run.
+    /// Waits until all stages have run.
     fn wait(&mut self) -> Promise<'_, ()>;
 
-    /// The values of `map`, as they are once all stages before have run.
+    /// The values of `map` after all stages so far.
     fn map(&mut self, map: Map) -> Promise<'_, Plane<i32>>;
 
-    /// Asks for the maps as they are once all stages before have run. The next pair may be prepared before they arrive.
+    /// Requests the maps after all stages so far. The next pair may be prepared before they arrive.
     fn request_maps(&mut self) -> Result<Ticket>;
 
-    /// The maps that this backend was asked for, once they have arrived, and [`Self::idle_iterations`] as it was then. What was
-    /// asked for earlier and never collected is dropped.
+    /// The requested maps, once they have arrived, and [`Self::idle_iterations`] at the time of the request.
+    /// Older requests that were not collected are dropped.
     ///
     /// # Panics
-    /// When the ticket is of another backend.
+    /// If the ticket is from another backend.
     fn maps(&mut self, ticket: Ticket) -> Promise<'_, (Maps, u32)>;
 
-    /// Starts to take the time of every stage, or stops.
+    /// Turns per-stage timing on or off.
     fn keep_time(&mut self, on: bool) -> Result<()>;
 
-    /// The time of every run of a stage since [`Backend::keep_time`] was last called, in order: a device's own where it has
-    /// a clock.
+    /// The time of every run of a stage since the last [`Backend::keep_time`], in order, from the device's
+    /// clock if it has one.
     fn times(&mut self) -> Promise<'_, Vec<(Stage, Duration)>>;
 
-    /// Cells of a volume of each level, as they are stored: the labels of all pixels, with padding.
+    /// Stored cells of a volume of each level: the labels of all pixels, with padding.
     fn cells(&self) -> Vec<u64>;
 
-    /// What went through since [`Backend::prepare`], which is included; all 0 where there is no device.
+    /// Device work since the start of [`Backend::prepare`]; all 0 without a device.
     fn traffic(&self) -> Traffic;
 
-    /// The backend as tests and diagnosis see it.
+    /// Access for tests and diagnosis.
     fn probe(&mut self) -> &mut dyn Probe;
 }
 
-/// Maps on their way, each with its ticket, the oldest first.
+/// Requested maps and the numbers of their tickets, oldest first.
 struct Requests<T> {
     waiting: std::collections::VecDeque<(u64, T)>,
     next: u64,
@@ -154,7 +155,7 @@ impl<T> Requests<T> {
         Ticket(self.next - 1)
     }
 
-    /// What belongs to the ticket; what is older goes.
+    /// The request of the ticket; drops older ones.
     fn take(&mut self, ticket: &Ticket) -> T {
         loop {
             let (number, request) = self.waiting.pop_front().expect("a ticket of this backend");

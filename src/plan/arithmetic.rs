@@ -1,12 +1,12 @@
-//! Costs in integers: their unit, their widths, and how messages are truncated.
+//! Integer costs: their unit, their widths, and the truncation of messages.
 
 use crate::options::Method;
 
-/// Units of cost in one nat.
+/// Units of cost per nat.
 pub const UNITS_PER_NAT: f64 = 4.0;
-/// Truncation of a hard potential's messages, in units. It is the largest for which no belief saturates in 16
-/// bits, even for a pixel that is a member of all 49 factors of its window, with two resolution messages and
-/// the largest evidence.
+/// Truncation of the messages of a hard potential, in units: the largest for which no belief saturates in 16
+/// bits, even for a pixel in all 49 factors of its window, with two resolution messages and the largest
+/// evidence.
 pub const HARD_CAP: u16 = 1023;
 
 /// Conversion from cost to evidence in 16-bit steps. With c in 1/256 cost units and D = min(c(d) - min c,
@@ -32,7 +32,7 @@ impl EvidenceScale {
         let limit = (cap / per_cost).ceil().clamp(1.0, u16::MAX.into()) as u16;
         let up = limit.leading_zeros();
         let unshifted = per_cost * 65536.0 / f64::from(1u32 << up);
-        // The multiplier uses all of 15 bits, so that product and rounding fit in 16.
+        // The multiplier uses 15 bits, so that product and rounding fit in 16.
         let mut down = 0;
         while down < 15 && unshifted * f64::from(2u32 << down) < 32767.0 {
             down += 1;
@@ -41,18 +41,18 @@ impl EvidenceScale {
         Self { multiplier, limit, up, down, cap: cap as u8 }
     }
 
-    /// Evidence for a cost `difference` above the pixel's cheapest label, in 1/256 cost units.
+    /// Evidence for a cost `difference` from the pixel's best label, in 1/256 cost units.
     #[must_use]
     #[inline]
     pub fn apply(self, difference: u16) -> u8 {
         let product = (u32::from(difference.min(self.limit) << self.up) * u32::from(self.multiplier)) >> 16;
-        // Both fit in 15 bits.
+        // Both terms fit in 15 bits.
         let e = (product as u16 + (1 << self.down >> 1)) >> self.down;
         e.min(self.cap.into()) as u8
     }
 }
 
-/// Storage width of messages and beliefs, which is also where their sums saturate.
+/// Storage width of messages and beliefs. Their sums saturate at its largest value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VolumeWidth {
     /// 8 bits.
@@ -71,7 +71,7 @@ impl VolumeWidth {
         }
     }
 
-    /// The largest value, which stands for infinity.
+    /// The largest value, used as infinity.
     #[must_use]
     pub fn most(self) -> u16 {
         match self {
@@ -81,27 +81,27 @@ impl VolumeWidth {
     }
 }
 
-/// Truncation of a sum of messages s to a message m(d) = min(s(d), high) - low. Where the sum is infinite, the
+/// Truncation of a sum of messages s to a message m(d) = min(s(d), high) - low. For an infinite sum, the
 /// message is tau.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Truncation {
     /// Cost of disagreement, in units.
     pub tau: u16,
-    /// Where the sum is truncated.
+    /// The rule for the bounds.
     pub rule: TruncationRule,
 }
 
-/// Where a message is truncated.
+/// The rule for the bounds (high, low) of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TruncationRule {
-    /// At tau above the smallest sum, which counts as at most infinity less tau: high = min s + tau, low = min s.
+    /// high = min s + tau, low = min s, where min s is at most infinity - tau.
     Relative,
-    /// At tau, given that the members' messages have minimum 0: high = tau, low = 0.
+    /// high = tau, low = 0, given that the members' messages have minimum 0.
     Absolute,
 }
 
 impl Truncation {
-    /// (high, low) for the smallest sum `min`, where `most` is infinite.
+    /// (high, low) for the smallest sum `min`, with infinity `most`.
     #[must_use]
     pub fn bounds(self, min: u32, most: u32) -> (u32, u32) {
         let tau = u32::from(self.tau);
@@ -115,7 +115,7 @@ impl Truncation {
     }
 }
 
-/// A truncation in units, at least 1.
+/// Converts a truncation to units, at least 1.
 pub(super) fn units(nats: f64) -> u16 {
     ((nats * UNITS_PER_NAT + 0.5).floor() as u16).clamp(1, HARD_CAP)
 }

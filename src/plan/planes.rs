@@ -1,10 +1,10 @@
-//! Planes through disparities: the constants of [`Stage::Plane`](crate::backend::Stage::Plane).
+//! Constants of the planes of [`Stage::Plane`](crate::backend::Stage::Plane).
 
-/// Disparities count up to 256 times 2 to so many 1/256 px from the plane, by round of least squares.
+/// By round of least squares: disparities count up to 2^(8 + this) / 256 px from the plane.
 pub const PLANE_BITS: [u32; 2] = [2, 0];
-/// The median that planes start from is found in steps of 2 to so many 1/256 px.
+/// The initial median is found in steps of 2^this / 256 px.
 pub const PLANE_START_BITS: u32 = 5;
-/// The steepest slope of a plane, in 1/256 px a pixel.
+/// Largest slope of a plane, in 1/256 px per pixel.
 pub const PLANE_STEEPEST: i32 = 256;
-/// How far a plane may pass from the median, in 1/256 px: as far as disparities count in the first round.
+/// Limit of the plane's distance from the median, in 1/256 px: the reach of disparities in the first round.
 pub const PLANE_FARTHEST: i32 = 256 << PLANE_BITS[0];

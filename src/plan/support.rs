@@ -1,10 +1,10 @@
-//! Support from around: the constants of [`Stage::Support`](crate::backend::Stage::Support).
+//! Constants of [`Stage::Support`](crate::backend::Stage::Support).
 
 /// Places along a row and along a column.
 pub const SUPPORT_PLACES: usize = 5;
-/// Pixels between two places.
+/// Distance between neighbouring places, in pixels.
 pub const SUPPORT_STEP: usize = 2;
 /// Pixels from the middle to the farthest place.
 pub const SUPPORT_REACH: usize = SUPPORT_STEP * (SUPPORT_PLACES / 2);
-/// A place supports a disparity that differs from its own by at most this, in 1/256 px: 2 px.
+/// A place supports disparities that differ from its own by at most this, in 1/256 px: 2 px.
 pub const SUPPORT_NEAR: i32 = 512;

@@ -1,30 +1,30 @@
-//! Votes for what no match shows: the constants and the shape of [`Stage::VoteFill`](crate::backend::Stage::VoteFill).
+//! Constants and shape of the votes of [`Stage::VoteFill`](crate::backend::Stage::VoteFill).
 
 use super::Plan;
 use crate::options::{Fill, Method};
 
-/// Distance from a voter's disparity, in 1/256 px, from which on its vote against a label is the same: 4 px.
+/// Limit of the distance between a label and a voter's disparity, in 1/256 px: 4 px.
 pub const VOTE_MOST: i32 = 1024;
-/// Bits by which such a distance is reduced to what is summed: a vote counts sixteenths of a pixel.
+/// Right shift of that distance: votes count sixteenths of a pixel.
 pub const VOTE_BITS: u32 = 4;
-/// Vote of a pixel without a disparity against a label by which it would hide what the right view sees: 1.5 px, in sixteenths.
+/// Vote of a pixel without a disparity against labels that would hide a label in the right view: 1.5 px, in sixteenths.
 pub const VOTE_HIDING: u32 = 24;
-/// Labels by which a surface must be nearer than what the right view sees, to hide it.
+/// A surface hides a label in the right view if it is nearer by at least this many labels.
 pub const HIDING_LABELS: u32 = 2;
-/// The least confidence of a sure pixel, in eighths of a nat. Others hide nothing by what they show, and may be outvoted.
+/// Smallest confidence of a sure pixel, in eighths of a nat. Others hide nothing, and may be outvoted.
 pub const VOTE_SURE: u32 = 32;
-/// A pixel that is not sure is outvoted by a vote that is further from its disparity than this, in 1/256 px: 2 px. Votes are fronto-parallel,
-/// and on slanted surfaces nearer ones say little.
+/// A pixel that is not sure is outvoted if the vote differs from its disparity by more than this, in 1/256
+/// px: 2 px. Votes are fronto-parallel, so smaller differences mean little on slanted surfaces.
 pub const VOTE_OUTVOTES: i32 = 512;
-/// Fractional bits of the sums along a row, so that faint votes from behind an edge still count.
+/// Fractional bits of the sums along a row, so that faint votes from beyond an edge still count.
 pub const VOTE_FRACTION_BITS: u32 = 16;
-/// Bits that a sum along a row loses before it is summed along its column.
+/// Right shift of sums along a row before they are summed along columns.
 pub const VOTE_SHIFT: u32 = 3;
-/// How far votes reach along a column, in half-size pixels.
+/// Reach of votes along a column, in half-size pixels.
 pub const VOTE_REACH: usize = 8;
-/// What a half-size pixel adds to its difference in colour for each column and row that it is away, in 8-bit levels.
+/// Distance of one column or row of half-size pixels, as a difference in colour in 8-bit levels.
 pub const VOTE_AWAY: u32 = 2;
-/// Words that the sums of a band take, unless a row takes more (open).
+/// Words of the sums of a band, unless one row takes more (open).
 const BAND_WORDS: usize = 4 << 20;
 
 /// Whether `method` fills by votes.
@@ -40,14 +40,14 @@ pub struct Votes {
     pub width: usize,
     /// Rows of half-size pixels.
     pub height: usize,
-    /// Labels that are voted for: those with the indices 0, 2, 4 and so on.
+    /// Number of labels that are voted for: those with the indices 0, 2, 4 and so on.
     pub labels: usize,
-    /// Number of rows whose votes are counted at a time. It changes no bit of the result.
+    /// Number of rows whose votes are counted at a time. It does not affect the result.
     pub band: usize,
 }
 
 impl Votes {
-    /// Those of `plan`.
+    /// The shape of the votes of `plan`.
     #[must_use]
     pub fn of(plan: &Plan) -> Self {
         let level = &plan.levels[0];
@@ -56,7 +56,7 @@ impl Votes {
         Self { width, height, labels, band: (BAND_WORDS / (width * labels)).clamp(1, height) }
     }
 
-    /// Number of rows whose sums that takes, at most.
+    /// Largest number of rows that are summed for a band.
     #[must_use]
     pub fn summed(&self) -> usize {
         (self.band + 2 * VOTE_REACH).min(self.height)

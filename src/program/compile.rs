@@ -1,4 +1,4 @@
-//! From plan and tiles to the list: the schedule, and the passes for what is computed.
+//! Compiles plan and tiles to the list of steps: the schedule, then the passes that change what is computed.
 
 use super::tiles::Tiles;
 use super::{Frame, Program, double_size, right_view, schedule, second_match, tiled};
@@ -6,10 +6,10 @@ use crate::error::Result;
 use crate::options::LeftRightCheck;
 
 impl Program {
-    /// The match of an image that is cut into `tiles`, and at twice its size where its method asks for it.
+    /// The match of an image cut into `tiles`, and also at twice its size if the method asks for it.
     ///
     /// # Errors
-    /// [`crate::Error::Range`] and [`crate::Error::Budget`] when the match at twice the size does not fit.
+    /// [`crate::Error::Range`] and [`crate::Error::Budget`] if the match at twice the size does not fit.
     pub fn new(tiles: &Tiles) -> Result<Self> {
         let own = Self::at_one_size(tiles);
         match tiles.whole().doubled()? {

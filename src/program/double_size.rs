@@ -1,15 +1,15 @@
-//! A match at twice the size of the pair, which follows that at its own size; both give one map.
+//! A match at twice the size after the one at the pair's own size; their maps are merged.
 
 use super::{Program, Step};
 
-/// The steps of `own`, then those of `double` on the doubled pair, and one map of both.
+/// The steps of `own`, then those of `double` on the doubled pair, then the merge.
 #[must_use]
 pub fn follow(own: Program, double: Program) -> Program {
     let Program { mut frames, mut steps } = own;
     let first = frames.len();
     frames.extend(double.frames);
     steps.push(Step::Double);
-    // The pair has been conditioned.
+    // The pair is already conditioned.
     steps.extend(double.steps.into_iter().filter(|step| *step != Step::Condition).map(|step| match step {
         Step::Enter(frame) => Step::Enter(first + frame),
         Step::Mosaic(frame) => Step::Mosaic(first + frame),
@@ -26,7 +26,7 @@ mod tests {
     use crate::program::samples;
 
     #[test]
-    fn the_doubled_pair_follows_with_frames_of_its_own() {
+    fn the_doubled_pair_follows_in_separate_frames() {
         let plan = samples::plan(LeftRightCheck::RightView);
         let own = samples::plain(&plan);
         let program = follow(own.clone(), own.clone());

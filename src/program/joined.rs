@@ -1,10 +1,10 @@
-//! The same stage at one level after the other as one run, for backends whose levels share buffers.
+//! Joins runs of one stage at successive levels into one run, for backends whose levels share buffers.
 
 use super::{Run, Step};
 use crate::plan::Plan;
 use crate::stage::Stage;
 
-/// `steps` with runs of the same stage at neighbouring levels made one, where they touch no level finer than `shared`.
+/// `steps` with runs of one stage at successive levels joined, if they touch no level finer than `shared`.
 #[must_use]
 pub fn join(plan: &Plan, shared: usize, steps: Vec<Step>) -> Vec<Step> {
     let may_join = |stage: Stage| stage.descriptor().joins && stage.finest_level(plan) >= shared;
@@ -12,7 +12,7 @@ pub fn join(plan: &Plan, shared: usize, steps: Vec<Step>) -> Vec<Step> {
     for step in steps {
         if let (Some(Step::Run(last)), Step::Run(run)) = (all.last_mut(), &step) {
             let goes_on = *run == Run::from(last.stage.coarser(last.levels)) && run.stage != last.stage;
-            if goes_on && last.part.is_none() && may_join(last.stage) {
+            if goes_on && last.band.is_none() && may_join(last.stage) {
                 last.levels += 1;
                 continue;
             }
@@ -28,7 +28,7 @@ mod tests {
     use crate::options::LeftRightCheck;
     use crate::program::{samples, schedule};
 
-    /// The steps with every run at its levels one by one.
+    /// The steps with joined runs split by level.
     fn apart(steps: &[Step]) -> Vec<Step> {
         let apart = |step: &Step| match step {
             Step::Run(run) => run.stages().map(Step::of).collect(),
@@ -38,7 +38,7 @@ mod tests {
     }
 
     #[test]
-    fn levels_that_share_go_together_and_no_others() {
+    fn only_levels_that_share_buffers_are_joined() {
         let plan = samples::plan(LeftRightCheck::RightView);
         let steps = schedule::estimate(&plan);
         let mut fewest = steps.len();
@@ -52,7 +52,7 @@ mod tests {
             assert!(joined.len() <= fewest);
             fewest = joined.len();
         }
-        // The graphs of all levels are one run, for example.
+        // For example, the graphs of all levels are one run.
         assert!(fewest < steps.len() * 3 / 4, "{fewest} of {}", steps.len());
     }
 }

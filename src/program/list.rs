@@ -1,23 +1,23 @@
-//! The list of steps that a match is.
+//! The list of steps of a match.
 
 use crate::image::Rect;
 use crate::plan::Plan;
 use crate::stage::{Data, Stage};
 use std::ops::Range;
 
-/// A part of the pair, as it goes to a backend.
+/// A part of the pair that a backend matches at a time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// The plan for it, as it is followed.
+    /// The plan of this part.
     pub plan: Plan,
     /// The pixels of the left view that are matched.
     pub crop: Rect,
-    /// Those of them that enter the maps.
+    /// The pixels of the crop that enter the maps.
     pub core: Rect,
-    /// Whether both views are mirrored and exchanged: the right view becomes the left one, its matches to the left again.
+    /// Whether views are mirrored and exchanged: the right view becomes the left one, with its matches to the left again.
     pub mirrored: bool,
-    /// Its place among the tiles of the image, from 1 on, and their number, twice that where they are matched twice; `None` where
-    /// the image is in one piece.
+    /// (number of the tile from 1 on, number of tiles), with twice the number if tiles are matched twice;
+    /// `None` if the image is in one piece.
     pub tile: Option<(usize, usize)>,
 }
 
@@ -35,97 +35,97 @@ impl Frame {
 pub enum View {
     /// The reference view.
     Left,
-    /// The other one, from the beliefs of the reference view.
+    /// The right view, from the beliefs of the left one.
     Right,
-    /// The other one, as the left view of the mirrored pair.
+    /// The right view, as the left view of the mirrored pair.
     Mirrored,
 }
 
-/// What some rows of a stage are run with.
+/// A band of rows of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Part {
+pub struct RowBand {
     /// Rows of the stage's level.
     pub rows: Range<usize>,
-    /// The messages that there are when its first rows run.
+    /// The messages that exist when the first rows run.
     pub sent: Sent,
 }
 
-/// Which messages there are when a stage starts. Those that have not been sent count as 0, whatever is stored.
+/// The messages that exist when a stage starts. Those that have not been sent count as 0, whatever is stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Sent {
-    /// Those of the level's dependency factors.
+    /// Messages of the level's dependency factors.
     pub dependency: bool,
-    /// Those between the level and the next coarser one.
+    /// Messages between the level and the next coarser one.
     pub above: bool,
-    /// Those between the level and the next finer one.
+    /// Messages between the level and the next finer one.
     pub below: bool,
 }
 
 /// One run of a stage.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Run {
-    /// The stage, at the finest level that it runs at.
+    /// The stage, at its finest level.
     pub stage: Stage,
-    /// At how many levels it runs, one next to the other.
+    /// Number of levels that it runs at, from that level on.
     pub levels: usize,
-    /// Some rows of its level; `None` for all.
-    pub part: Option<Part>,
+    /// A band of rows of its level; `None` for all rows.
+    pub band: Option<RowBand>,
 }
 
 impl From<Stage> for Run {
     fn from(stage: Stage) -> Self {
-        Self { stage, levels: 1, part: None }
+        Self { stage, levels: 1, band: None }
     }
 }
 
 impl Run {
-    /// The stage at each of its levels.
+    /// The stage at each level.
     pub fn stages(&self) -> impl Iterator<Item = Stage> + use<> {
         let stage = self.stage;
         (0..self.levels).map(move |coarser| stage.coarser(coarser))
     }
 
-    /// About how long it takes on one thread, in ns.
+    /// Approximate time on one thread, in ns.
     #[must_use]
     pub fn work(&self, plan: &Plan) -> f64 {
         let all: f64 = self.stages().map(|stage| stage.work(plan)).sum();
         let height = plan.levels[self.stage.level().unwrap_or(0)].height;
-        all * self.part.as_ref().map_or(1.0, |part| part.rows.len() as f64 / height as f64)
+        all * self.band.as_ref().map_or(1.0, |band| band.rows.len() as f64 / height as f64)
     }
 }
 
 /// A step of a match.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
-    /// Corrects the pair.
+    /// Conditions the pair.
     Condition,
-    /// The pair at twice its size takes the place of the pair.
+    /// Replaces the pair by the pair at twice its size.
     Double,
-    /// Takes this frame to the backend: the stages that follow work on it.
+    /// Loads this frame into the backend; the stages that follow work on it.
     Enter(usize),
     /// Runs a stage.
     Run(Run),
-    /// Nobody needs this any more.
+    /// Frees data after their last use.
     Free(Data),
     /// An iteration is done.
     Iteration,
-    /// Where message passing has settled, the steps up to [`Step::EndOfPhase`] are left out.
+    /// If message passing has settled, skips to [`Step::EndOfPhase`].
     Settled,
-    /// The end of a phase that may settle.
+    /// Ends a phase that may settle.
     EndOfPhase,
-    /// Starts the maps of the whole image, of which this is the frame: they are put together from those of tiles.
+    /// Starts the maps of the whole image, which this frame describes; tiles will fill them.
     Mosaic(usize),
-    /// Takes what the frame has found of a view into the maps of the whole image.
+    /// Copies the frame's maps of a view into the maps of the whole image.
     Place(View),
-    /// All tiles are in place: the stages that follow work on the maps of the whole image.
+    /// Ends the tiles; the stages that follow work on the maps of the whole image.
     Gather,
-    /// There, takes the disparities of the right view in the place of those of the left one.
+    /// Replaces the disparities of the left view in the maps of the whole image by those of the right view.
     PlaceRight,
-    /// Asks for the maps of a view.
+    /// Requests the maps of a view.
     Ask(View),
-    /// Waits for the maps that were asked for.
+    /// Waits for the requested maps.
     Collect,
-    /// Makes one map of those at both sizes.
+    /// Merges the maps of both sizes.
     Join,
 }
 
@@ -136,7 +136,7 @@ impl Step {
         Self::Run(stage.into())
     }
 
-    /// The stage that it runs, if it does.
+    /// The stage that it runs, if any.
     #[must_use]
     pub fn stage(&self) -> Option<Stage> {
         match self {
@@ -149,21 +149,21 @@ impl Step {
 /// The steps of a match, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
-    /// What the steps enter.
+    /// The frames that the steps enter.
     pub frames: Vec<Frame>,
     /// The steps.
     pub steps: Vec<Step>,
 }
 
 impl Program {
-    /// Whether the only wait is for the maps, at the end: until then, nothing is asked of the backend that it has not done yet.
+    /// Whether the only wait is the last step, for the maps; before it, the host never waits for the backend.
     #[must_use]
     pub fn waits_once(&self) -> bool {
         let waits = |step: &Step| matches!(step, Step::Collect | Step::Place(_));
         self.steps.iter().position(waits) == Some(self.steps.len() - 1)
     }
 
-    /// Each step with the plan of its frame: that of the first one before any is entered.
+    /// Each step with the plan of the current frame (the first one until a frame is entered).
     pub fn with_plans(&self) -> impl Iterator<Item = (&Step, &Plan)> {
         let mut frame = 0;
         self.steps.iter().map(move |step| {
@@ -174,7 +174,7 @@ impl Program {
         })
     }
 
-    /// About how long it takes on one thread, in ns.
+    /// Approximate time on one thread, in ns.
     #[must_use]
     pub fn work(&self) -> f64 {
         let runs = self.with_plans().map(|(step, plan)| match step {
@@ -184,7 +184,7 @@ impl Program {
         runs.sum()
     }
 
-    /// The same match, with the steps of each frame that is entered made anew by `pass`, which may change the plan.
+    /// The same match after `pass`, which rewrites the steps of each entered frame and may change its plan.
     #[must_use]
     pub fn each_frame(self, mut pass: impl FnMut(&mut Plan, Vec<Step>) -> Vec<Step>) -> Self {
         let Self { mut frames, steps } = self;

@@ -1,7 +1,7 @@
-//! A match as a list of steps, which everything else reads: the engine runs it, and work and progress are sums over it.
+//! A match as a list of steps: the engine runs it, and work and progress are sums over it.
 //!
-//! [`schedule`] writes the plain list for a pair in one piece. Each other thing that a method, the memory or a backend asks for is a
-//! pass from list to list, in a file of its own:
+//! [`schedule`] writes the basic list for a pair in one piece. Each other requirement of the method, the
+//! memory or the backend is a pass from list to list, in its own file:
 //!
 //! ```text
 //! schedule ──> second_match ──> right_view ──> tiled ──> double_size        what is computed
@@ -22,4 +22,4 @@ pub mod tiled;
 pub mod tiles;
 pub mod together;
 
-pub use list::{Frame, Part, Program, Run, Sent, Step, View};
+pub use list::{Frame, Program, RowBand, Run, Sent, Step, View};

@@ -1,10 +1,10 @@
-//! The map of the right view, refined like that of the left one.
+//! The map of the right view, post-processed like the left one.
 
 use super::{Step, View};
 use crate::plan::Plan;
 use crate::stage::Stage;
 
-/// What makes the right view the left one, between its labels.
+/// The stages that make the right view the left one, up to sub-pixel disparities.
 #[must_use]
 pub fn stages(plan: &Plan) -> Vec<Step> {
     let between_labels: &[_] =
@@ -12,8 +12,7 @@ pub fn stages(plan: &Plan) -> Vec<Step> {
     [&[Stage::SwapViews], between_labels].concat().into_iter().map(Step::of).collect()
 }
 
-/// `steps`, and then the same for the right view, once the left view's maps have been asked for: the disparities between its
-/// labels, and the stages of maps.
+/// Adds the right view to `steps`, after the request for the left maps: sub-pixel disparities, map stages.
 #[must_use]
 pub fn follow(plan: &Plan, mut steps: Vec<Step>) -> Vec<Step> {
     let is_of_maps = |step: &&Step| step.stage().is_some_and(Stage::is_of_maps);

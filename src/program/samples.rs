@@ -1,10 +1,10 @@
-//! What the tests of the passes share.
+//! Samples for the tests of the passes.
 
 use super::{Frame, Program, schedule};
 use crate::options::{DisparityRange, LeftRightCheck, Method};
 use crate::plan::Plan;
 
-/// A plan whose right view is wanted, and read off the beliefs or found by a second match.
+/// A plan with a map of the right view, which is computed from the beliefs or by a second match.
 pub(super) fn plan(check: LeftRightCheck) -> Plan {
     let mut method = Method::default();
     method.refinement.left_right_check = check;
@@ -13,7 +13,7 @@ pub(super) fn plan(check: LeftRightCheck) -> Plan {
     Plan::new(300, 240, DisparityRange::new(0, 31).unwrap(), &method).unwrap()
 }
 
-/// The plain list of it.
+/// The basic program of `plan`.
 pub(super) fn plain(plan: &Plan) -> Program {
     Program { frames: vec![Frame::whole(plan)], steps: schedule::steps(plan) }
 }

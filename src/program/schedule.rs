@@ -1,4 +1,4 @@
-//! The schedule: the only place that knows levels, iterations, convergence and the order of what follows.
+//! The schedule: levels, iterations, convergence and the order of stages are decided here only.
 
 use super::{Run, Step};
 use crate::options::{Method, Order};
@@ -7,7 +7,7 @@ use crate::program::View;
 use crate::stage::Stage;
 use std::iter;
 
-/// All steps of a match in one piece, of the left view alone.
+/// All steps of a match in one piece, of the left view only.
 #[must_use]
 pub fn steps(plan: &Plan) -> Vec<Step> {
     let mut steps = vec![Step::Condition, Step::Enter(0)];
@@ -17,8 +17,8 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
     steps
 }
 
-/// From a prepared pair to the disparity of every pixel of the left view, and to the labels of the right one where these are read
-/// off the beliefs.
+/// From a prepared pair to the disparities of the left view, and to the labels of the right view if these are
+/// computed from the beliefs.
 #[must_use]
 pub fn estimate(plan: &Plan) -> Vec<Step> {
     let levels = 0..plan.levels.len();
@@ -36,13 +36,13 @@ pub fn estimate(plan: &Plan) -> Vec<Step> {
     steps
 }
 
-/// What happens when level `z` joins the flooding: it gets its labels and their evidence.
+/// The steps when level `z` joins the flooding: they set its labels and their evidence.
 #[must_use]
 pub fn join(z: usize) -> Vec<Step> {
     vec![Step::of(Stage::LabelWindow(z)), Step::of(Stage::Evidence(z))]
 }
 
-/// The flooding of `plan`; `join` gives the steps for each level that joins, coarsest first.
+/// The flooding of `plan`; `join` returns the steps for each level that joins, coarsest first.
 pub fn flood(plan: &Plan, join: impl Fn(usize) -> Vec<Step>) -> Vec<Step> {
     let mut steps = Vec::new();
     let mut joined = plan.levels.len();
@@ -64,8 +64,8 @@ pub fn flood(plan: &Plan, join: impl Fn(usize) -> Vec<Step>) -> Vec<Step> {
     steps
 }
 
-/// The stages by which what the coarser levels know reaches the one that joins in a phase, before its own messages start. The
-/// coarser level's beliefs take in what came up, or the next resolution would take off a message that they do not hold.
+/// The stages that pass information from coarser levels to the one that joins in a phase, before its own messages. The
+/// coarser level's beliefs include its messages too, or the next resolution would subtract messages that they lack.
 fn joining(plan: &Plan, phase: &Phase) -> impl Iterator<Item = Stage> + use<> {
     let (joining, above) = (phase.finest, phase.finest + 1);
     let is_alone = above == plan.levels.len() || plan.phases.len() == 1;
@@ -73,17 +73,17 @@ fn joining(plan: &Plan, phase: &Phase) -> impl Iterator<Item = Stage> + use<> {
     stages.into_iter().filter(move |_| !is_alone)
 }
 
-/// The stages of iteration `i`, from 0 on, of a phase. Every message is from old beliefs: those between levels first, then a
-/// level's own and its new beliefs.
+/// The stages of iteration `i`, from 0 on, of a phase. Every message is computed from old beliefs: first
+/// those between levels, then those within a level and its new beliefs.
 fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> + use<> {
     let (finest, coarsest) = (phase.finest, plan.levels.len() - 1);
     // The coarsest levels that exchange messages with the next finer one, and that are flooded.
     let (exchanged, flooded) = match plan.method.schedule.order {
         Order::Together => (coarsest, coarsest),
-        // What joining has just exchanged would give the same messages again.
+        // Joining has just exchanged these messages; repeating it would give the same ones.
         Order::CoarseFirst if finest > 0 => (if i == 0 { finest } else { coarsest }, coarsest),
-        // The coarser levels have settled: they and level 0 speak in turns. A level that is farther away than messages
-        // between levels still go has no say any more.
+        // The coarser levels have settled, and alternate with level 0. Levels too far away to reach level 0
+        // in the remaining iterations are skipped.
         Order::CoarseFirst => {
             let reach = coarsest.min((phase.iterations / 2 - i / 2) as usize);
             if i.is_multiple_of(2) { (0, reach) } else { (reach, 0) }
@@ -92,15 +92,14 @@ fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> 
     (finest + 1..=exchanged).map(Stage::Resolution).chain((finest..=flooded).map(Stage::Flood))
 }
 
-/// What follows the disparities: the stages that look at maps alone, in the order of their table, where the method takes them.
+/// The map stages that the method uses, in the order of the table.
 #[must_use]
 pub fn post_processing(method: &Method) -> Vec<Step> {
     let taken = Stage::OF_MAPS.iter().filter(|stage| stage.is_taken(method));
     taken.copied().map(Step::of).collect()
 }
 
-/// The steps that run at one level alone, each flooding as its two parts: messages, then beliefs. A backend that does not do both in
-/// one sweep runs these.
+/// Splits a flooding at one level into messages and beliefs, for backends that compute them separately.
 #[must_use]
 pub fn split(run: Run) -> Vec<Run> {
     match run.stage {

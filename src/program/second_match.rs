@@ -1,9 +1,9 @@
-//! The right view by a second match: the mirrored pair is matched first, and its labels become those of the right view.
+//! The right view by a second match: the mirrored pair is matched first, and its labels become the right labels.
 
 use super::{Frame, Program, Step};
 use crate::stage::Stage;
 
-/// The match of `program`, which is in one piece, after one of the mirrored pair.
+/// A match of the mirrored pair, then that of `program`, which is in one piece.
 #[must_use]
 pub fn first(program: Program) -> Program {
     let Program { mut frames, steps } = program;

@@ -1,4 +1,4 @@
-//! What is never needed at the same time shares memory, and what nobody needs any more is freed.
+//! Memory sharing of data that are never needed at the same time, and freeing of data after their last use.
 
 use super::Step;
 use crate::plan::Plan;
@@ -6,7 +6,7 @@ use crate::stage::{Data, Place, Volume};
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
-/// The steps at which each datum is needed: from the first to the last that reads or writes it, or, for scratch memory, each step alone.
+/// The steps at which each datum is needed: from the first to the last access, or, for scratch memory, single steps.
 fn lives(plan: &Plan, steps: &[Step]) -> HashMap<Data, Vec<RangeInclusive<usize>>> {
     let mut lives: HashMap<_, Vec<RangeInclusive<usize>>> = HashMap::new();
     for (at, step) in steps.iter().enumerate() {
@@ -24,8 +24,8 @@ fn lives(plan: &Plan, steps: &[Step]) -> HashMap<Data, Vec<RangeInclusive<usize>
     lives
 }
 
-/// Pairs of data in the same memory: on the CPU path the costs of a level in that of its messages, and on a device what the table of
-/// data [places](Place) in that of others.
+/// Pairs of data that may share memory: on the CPU path the costs of a level and its messages; on a device
+/// data that the table [places](Place) in other data.
 fn pairs(plan: &Plan) -> Vec<[Data; 2]> {
     let levels = plan.levels.len();
     let mut pairs: Vec<_> =
@@ -43,8 +43,8 @@ fn pairs(plan: &Plan) -> Vec<[Data; 2]> {
     pairs
 }
 
-/// The steps of a frame, with graphs freed after the last stage that reads them; `plan` [shares](Plan::shares) memory where no two
-/// that would do so are needed at the same time.
+/// The steps of a frame, with graphs freed after the last stage that reads them; `plan`
+/// [shares](Plan::shares) memory if no pair is needed at the same time.
 #[must_use]
 pub fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
     let lives = lives(plan, &steps);
@@ -92,9 +92,9 @@ mod tests {
         }
     }
 
-    /// Control: costs that are read again once messages have been sent keep memory of their own.
+    /// Control: costs that are read after messages were sent do not share memory.
     #[test]
-    fn what_lives_at_the_same_time_does_not_share() {
+    fn control_data_needed_at_the_same_time_do_not_share() {
         let mut plan = Plan::new(80, 60, DisparityRange::new(0, 20).unwrap(), &Method::default()).unwrap();
         for late in [Stage::Evidence(1), Stage::Pyramid(2)] {
             let mut steps = schedule::steps(&plan);

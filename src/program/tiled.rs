@@ -1,11 +1,10 @@
-//! A match tile by tile: everything that looks at volumes for one tile after the other, then the stages of maps on the maps of the
-//! whole image.
+//! A match in tiles: the stages on volumes for each tile, then the map stages on the maps of the whole image.
 
 use super::tiles::Tiles;
 use super::{Frame, Program, Step, View, right_view};
 use crate::stage::Stage;
 
-/// The match of `program`, which is in one piece, in `tiles`.
+/// The match of `program`, which is in one piece, cut into `tiles`.
 #[must_use]
 pub fn cut(program: &Program, tiles: &Tiles) -> Program {
     let [whole, ..] = &program.frames[..] else { unreachable!("a frame to match") };
@@ -35,7 +34,7 @@ pub fn cut(program: &Program, tiles: &Tiles) -> Program {
     let first = program.steps.iter().position(is_of_maps).unwrap_or(program.steps.len());
     for step in &program.steps[first..] {
         match step.stage() {
-            // The tiles have found the disparities of the right view.
+            // The tiles already have the disparities of the right view.
             Some(Stage::SubPixel | Stage::Refine) => cut.steps.push(Step::PlaceRight),
             Some(Stage::Cost) => {}
             _ => cut.steps.push(step.clone()),
@@ -48,7 +47,7 @@ fn is_of_maps(step: &Step) -> bool {
     step.stage().is_some_and(Stage::is_of_maps)
 }
 
-/// Each frame that is entered, with the steps that look at its volumes.
+/// Each entered frame, with the steps on its volumes.
 fn entered(program: &Program) -> Vec<(usize, &[Step])> {
     let is_enter = |step: &Step| matches!(step, Step::Enter(_));
     let ends = |step: &Step| is_enter(step) || is_of_maps(step) || step.stage() == Some(Stage::MirrorLabels);
@@ -68,7 +67,7 @@ mod tests {
     use crate::options::LeftRightCheck;
     use crate::program::{samples, schedule, second_match};
 
-    /// Each tile is entered, estimated and placed, of each view once; what follows looks at maps alone.
+    /// Each tile of each view is entered, estimated and placed once; then only map stages follow.
     #[test]
     fn tiles_are_estimated_one_by_one_and_finished_together() {
         for check in [LeftRightCheck::RightView, LeftRightCheck::SecondMatch] {

@@ -1,7 +1,6 @@
-//! Splits a pair whose volumes do not fit in memory into tiles: volumes are per tile, maps are always whole.
+//! Splits pairs whose volumes exceed memory into tiles. Volumes exist per tile; maps are always whole.
 //!
-//! The split is pure: it depends on the plan of the whole image alone, so the bits are the same on every
-//! machine.
+//! The split depends only on the plan of the whole image, so the result is the same on every machine.
 //!
 //! ```text
 //! crop: ─────────────────────────────────────────────
@@ -9,9 +8,9 @@
 //! ```
 //!
 //! The cores partition the image; only the core of a tile's crop enters the maps. The overlap gives the
-//! core's outermost pixels the surroundings that they have in the whole image. The reach contains their
-//! matches, because the right view is cropped in the same way: it is as wide as the largest disparity, and
-//! where disparities are negative there is one on the right too. A crop ends at the borders of the image.
+//! outermost pixels of the core the same surroundings as in the whole image. The reach contains their
+//! matches, because the right view is cropped in the same way: it is as wide as the largest disparity; for
+//! negative disparities there is one on the right too. Crops end at the borders of the image.
 
 use super::together::streamed;
 use crate::error::{BudgetError, Result};
@@ -20,26 +19,26 @@ use crate::plan::{FullSize, Plan};
 
 use std::ops::Range;
 
-/// Width of the overlap in pixels, rounded up to whole pixels of the coarsest level (32 of them by default).
+/// Width of the overlap in pixels, rounded up to pixels of the coarsest level (32 pixels by default).
 ///
-/// Measured by the share of pixels that tiling moves by more than 1 px (default preset; 0, 32, 64 and 96 px,
-/// as the grid allows). Five Middlebury pairs in 2 to 4 tiles: 0.00 to 0.19 % without an overlap, at most
-/// 0.002 % with 32, at most 0.001 % with 64 or 96. Seven rendered scenes in 2 to 12 tiles: 0.00 to 0.90 %
-/// without, none with 32. The plain wall, whose only cues are far away: 5 and 11 % without, 0.11 % and none
-/// with 32. No overlap helps where texture zones limit the labels, because each tile finds its own zones: in
-/// two pairs, a fifth to a half of the pixels move, towards the truth as often as away from it.
+/// Measured as the share of pixels that tiling moves by more than 1 px (default preset; overlaps of 0, 32, 64
+/// and 96 px). Five Middlebury pairs in 2 to 4 tiles: 0.00 to 0.19 % without an overlap, at most 0.002 % with
+/// 32, at most 0.001 % with 64 or 96. Seven rendered scenes in 2 to 12 tiles: 0.00 to 0.90 % without, none
+/// with 32. The plain wall, whose only cues are far away: 5 and 11 % without, 0.11 % and none with 32. No
+/// overlap helps if texture zones limit the labels, because each tile finds its own zones: in two pairs, a
+/// fifth to a half of the pixels move, about as often towards the truth as away from it.
 pub const OVERLAP: usize = 32;
 
-/// A part of the image that is matched by itself.
+/// A part of the image that is matched separately.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
     /// The pixels that enter the maps.
     pub core: Rect,
-    /// The pixels that are matched. The crop starts at a whole pixel of the coarsest level, so that the
-    /// pyramid's grids are those of the whole image.
+    /// The pixels that are matched. The crop starts at a whole pixel of the coarsest level, so that the grids
+    /// of the pyramid are those of the whole image.
     pub crop: Rect,
-    /// The plan for the crop; its [`Plan::core`] holds the core's columns, relative to the crop, and its [`Plan::memory`] what a tile
-    /// may take.
+    /// The plan for the crop; its [`Plan::core`] holds the core's columns, relative to the crop, and its
+    /// [`Plan::memory`] the memory limit of a tile.
     pub plan: Plan,
 }
 
@@ -51,26 +50,25 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// The tiles for a match by `whole`, the plan for the whole image. There is one tile where the whole
-    /// image fits in the memory of its method; otherwise the tiles are those that fit and crop the fewest
-    /// pixels in all.
+    /// The tiles for a match by `whole`, the plan for the whole image: one tile if the whole image fits in
+    /// the memory of its method; otherwise tiles that fit and crop the fewest pixels in total.
     ///
     /// # Errors
-    /// [`Error::Budget`](crate::Error::Budget) when no tile is small enough, here or in the match at twice the size that the
-    /// method asks for.
+    /// [`Error::Budget`](crate::Error::Budget) if no tile is small enough, here or in the match at twice the
+    /// size that the method asks for.
     pub fn new(whole: &Plan) -> Result<Self> {
         Self::with_overlap(whole, OVERLAP)
     }
 
-    /// As [`Tiles::new`], with an overlap of at least `overlap` pixels, to measure its effect.
+    /// Like [`Tiles::new`], with an overlap of at least `overlap` pixels, to measure its effect.
     ///
     /// # Errors
-    /// As [`Tiles::new`].
+    /// The errors of [`Tiles::new`].
     pub fn with_overlap(whole: &Plan, overlap: usize) -> Result<Self> {
         Self::at_all_sizes(whole, overlap).map_err(|needed| {
             let FullSize { size: (width, height), range } = whole.of_pair();
             let memory = whole.method.tiles.memory;
-            // Where more may be taken, more may be held: what is told must be enough.
+            // With a larger limit, more may be held: the reported limit must be enough.
             let mut needed = needed;
             while let Ok(granted) = needed.try_into()
                 && let Err(more) = Self::at_all_sizes(&whole.granted(granted), overlap)
@@ -81,17 +79,17 @@ impl Tiles {
         })
     }
 
-    /// The tiles, where those of the match at twice the size fit, too; else how many MiB the smallest ones need.
+    /// The tiles, if tiles of the match at twice the size fit too; else the MiB that the smallest ones need.
     fn at_all_sizes(whole: &Plan, overlap: usize) -> Result<Self, u64> {
         let tiles = Self::at_one_size(whole, overlap)?;
-        // What else is wrong with that size is told where it is matched.
+        // Other errors of that size are reported when it is matched.
         if let Ok(Some(double)) = whole.doubled() {
             Self::at_one_size(&double, overlap)?;
         }
         Ok(tiles)
     }
 
-    /// The tiles, or how many MiB the smallest ones need.
+    /// The tiles, or the MiB that the smallest ones need.
     fn at_one_size(whole: &Plan, overlap: usize) -> Result<Self, u64> {
         let (width, height) = whole.size();
         let memory = u64::from(whole.method.tiles.memory) << 20;
@@ -120,7 +118,7 @@ impl Tiles {
         };
         let rows = down.spans(height);
         let mut tiles = Vec::new();
-        // Column by column: all crops of a column have the same width.
+        // Column by column, since all crops of a column have the same width.
         for [core_x, crop_x] in across.spans(width) {
             for [core_y, crop_y] in &rows {
                 let core = Rect { x: core_x.clone(), y: core_y.clone() };
@@ -134,7 +132,7 @@ impl Tiles {
         Ok(Self { whole: whole.clone(), tiles })
     }
 
-    /// The whole image in one piece, whatever memory that takes.
+    /// The whole image in one piece, regardless of its memory.
     #[must_use]
     pub fn in_one_piece(whole: &Plan) -> Self {
         let all = Rect::whole(whole.size());
@@ -159,21 +157,21 @@ impl Tiles {
         self.tiles.len()
     }
 
-    /// The plan that takes the most memory, as a match on the CPU path follows it that nobody looks into: the plan of the whole image where there
-    /// is one tile.
+    /// The plan that takes the most memory on the CPU path without an inspector: the plan of the whole image
+    /// if there is one tile.
     #[must_use]
     pub fn largest(&self) -> Plan {
         let plans = self.tiles.iter().map(|tile| streamed(&tile.plan).on_host());
         plans.max_by_key(Plan::bytes).unwrap_or_else(|| self.whole.clone())
     }
 
-    /// Largest number of bytes that the match takes on the CPU path.
+    /// Upper bound of the bytes of the match on the CPU path.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.beside() + self.largest().bytes()
     }
 
-    /// The same on a device.
+    /// Upper bound of the bytes of the match on a device.
     #[must_use]
     pub fn bytes_on_device(&self) -> u64 {
         let plans = self.tiles.iter().map(|tile| streamed(&tile.plan).on_device().bytes());
@@ -185,12 +183,12 @@ impl Tiles {
     }
 }
 
-/// Bytes that a match in tiles takes besides the current tile.
+/// Bytes of a match in tiles besides the current tile.
 fn beside(whole: &Plan) -> u64 {
     whole.pair_bytes() + whole.conditioning_bytes() + whole.mosaic_bytes()
 }
 
-/// The smallest number in `range` for which `holds` is true; it must be true for all larger ones.
+/// The smallest number in `range` for which `holds` is true, which must be monotonic.
 fn partition(range: Range<usize>, holds: impl Fn(usize) -> bool) -> Option<usize> {
     let Range { start: mut low, end: mut high } = range.clone();
     while low < high {

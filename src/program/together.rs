@@ -1,35 +1,35 @@
-//! How several stages go down an image together, so that of level 0 only the rows between the first and the last of them are
-//! needed.
+//! Wavefronts: several stages move down the image together, so that only the rows of level 0 between the
+//! first and the last stage are held.
 //!
-//! In each step every stage, in the order of the schedule, computes the next [`BAND`] rows. It stays so far behind the one before
-//! that what it reads is there, and that nobody needs any more what it overwrites. The results are those of one stage after
-//! the other.
+//! In each step every stage, in the order of the schedule, computes its next [`BAND`] rows. It stays so far
+//! behind the previous stage that its inputs are complete, and that it overwrites nothing that is still
+//! needed. The results are the same as stage by stage.
 
 use super::schedule::{self, split};
-use super::{Part, Run, Sent, Step};
+use super::{RowBand, Run, Sent, Step};
 use crate::plan::Plan;
 use crate::stage::{Data, Stage, Volume};
 use std::ops::Range;
 
-/// Rows of level 0 that each stage computes in a step: enough for the threads to share.
+/// Rows of level 0 that each stage computes in a step, enough to share among threads.
 pub const BAND: usize = 32;
 
-/// The plan by which a match goes that nobody looks into: where its steps allow it, those that need level 0 go down the image
-/// together, and only the rows between them are held.
+/// The plan of a match without an inspector: if possible, the steps on level 0 run as a wavefront, and only
+/// the rows between them are held.
 #[must_use]
 pub fn streamed(plan: &Plan) -> Plan {
     going_together(plan, &schedule::estimate(plan)).map_or_else(|| plan.clone(), |(plan, ..)| plan)
 }
 
-/// The steps of a frame with those that need level 0 going down the image together, where they can; `plan` then holds fewer rows.
+/// The steps of a frame, with those on level 0 as a wavefront if possible; `plan` then holds fewer rows.
 #[must_use]
 pub fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
     let Some((streamed, range, wavefront)) = going_together(plan, &steps) else { return steps };
     let mut all = steps[..range.start].to_vec();
     let sent = sent(&steps[..range.start], &wavefront.stages);
-    all.extend(wavefront.parts().map(|(i, rows)| {
-        let part = Some(Part { rows, sent: sent[i] });
-        Step::Run(Run { stage: wavefront.stages[i], levels: 1, part })
+    all.extend(wavefront.bands().map(|(i, rows)| {
+        let band = Some(RowBand { rows, sent: sent[i] });
+        Step::Run(Run { stage: wavefront.stages[i], levels: 1, band })
     }));
     let markers = steps[range.clone()].iter().filter(|step| step.stage().is_none());
     all.extend(markers.cloned());
@@ -38,33 +38,33 @@ pub fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
     all
 }
 
-/// The plan with fewer rows, the steps that go together, and how; `None` where they cannot, or where that takes no less memory.
+/// The plan with fewer rows, the steps of the wavefront, and the wavefront; `None` if impossible or without savings.
 fn going_together(plan: &Plan, steps: &[Step]) -> Option<(Plan, Range<usize>, Wavefront)> {
     let start = steps.iter().position(|step| step.stage() == Some(Stage::Evidence(0)))?;
     let by_rows = |step: &Step| step.stage().map_or(*step == Step::Iteration, goes_by_rows);
     let end = start + steps[start..].iter().position(|step| !by_rows(step)).unwrap_or(steps.len() - start);
-    // Nothing else may need level 0, and its costs are computed where they are needed.
+    // No other step may need level 0, and its costs are computed where they are needed.
     let cost = Data::Volume(Volume::Cost(0));
     let needs_whole = |stage: Stage| {
         stage.needs_level_0(plan) || (stage != Stage::Cost && stage.writes().any(|data| data == cost))
     };
     let outside = steps[..start].iter().chain(&steps[end..]).filter_map(Step::stage);
-    // Where all levels join at once, their many iterations would leave no row out.
+    // If all levels join at once, the lags of their many iterations would cover all rows.
     if plan.phases.len() == 1 || !plan.costs_go_by_rows() || outside.into_iter().any(needs_whole) {
         return None;
     }
     let wavefront = Wavefront::new(plan, steps[start..end].iter().filter_map(Step::stage));
     let streamed = Plan { held: wavefront.rows(), ..plan.clone() };
-    // With few labels the costs take less than what they are computed from.
+    // With few labels, costs are smaller than the data that they are computed from.
     (streamed.bytes() < plan.bytes()).then_some((streamed, start..end, wavefront))
 }
 
-/// Whether `stage` goes row by row, or stands for stages that do.
+/// Whether `stage`, or each of its parts, can run on a band of rows.
 fn goes_by_rows(stage: Stage) -> bool {
     split(stage.into()).iter().all(|run| run.stage.descriptor().reach.is_some())
 }
 
-/// Which messages there are when each of `stages` starts, which follow `before`.
+/// The messages that exist when each of `stages` starts, after the steps `before`.
 fn sent(before: &[Step], stages: &[Stage]) -> Vec<Sent> {
     let mut past: Vec<Stage> =
         before.iter().filter_map(Step::stage).flat_map(|s| split(s.into())).map(|run| run.stage).collect();
@@ -82,37 +82,37 @@ fn sent(before: &[Step], stages: &[Stage]) -> Vec<Sent> {
     all
 }
 
-/// Stages that go down an image together.
+/// Stages that move down the image together.
 #[derive(Clone, Debug)]
 struct Wavefront {
     stages: Vec<Stage>,
-    /// Rows of level 0 that each stage is behind the first one.
+    /// Rows of level 0 by which each stage is behind the first.
     lags: Vec<usize>,
     /// Height of each level.
     heights: Vec<usize>,
-    /// Rows of level 0 that a step computes.
+    /// Rows of level 0 per step.
     band: usize,
-    /// Rows of level 0 that the last stage reads above its own.
+    /// Rows of level 0 above its own that the last stage reads.
     above: usize,
 }
 
-/// How many rows around its own, of its level, a stage reads that goes row by row.
+/// Number of rows around its own that a stage reads at its level, if it can run on a band.
 fn reach(stage: Stage) -> usize {
     stage.descriptor().reach.expect("a stage that goes row by row")
 }
 
 impl Wavefront {
-    /// The wavefront of these stages, which go row by row.
+    /// The wavefront of these stages, which can run on bands of rows.
     fn new(plan: &Plan, stages: impl Iterator<Item = Stage>) -> Self {
         let stages: Vec<Stage> = stages.flat_map(|stage| split(stage.into())).map(|run| run.stage).collect();
         let level = |stage: &Stage| stage.level().unwrap_or(0);
-        // Whole pixels of the coarsest level make whole rows of all.
+        // Multiples of a pixel of the coarsest level are whole rows at all levels.
         let step = 1 << stages.iter().map(level).max().unwrap_or(0);
         let reaches: Vec<usize> = stages.iter().map(|stage| reach(*stage) << level(stage)).collect();
         let mut behind = 0;
         let mut lags = Vec::new();
         for (i, &own) in reaches.iter().enumerate() {
-            // The one before may still read what this one overwrites.
+            // The stage before may still read what this one overwrites.
             let before = if i == 0 { 0 } else { own.max(reaches[i - 1]) };
             behind += before.next_multiple_of(step);
             lags.push(behind);
@@ -122,22 +122,22 @@ impl Wavefront {
         Self { stages, lags, heights, band: BAND.next_multiple_of(step), above }
     }
 
-    /// Rows of level 0 that are needed at the same time, at most.
+    /// Largest number of rows of level 0 needed at the same time.
     fn rows(&self) -> usize {
         (self.band + self.lags.last().unwrap_or(&0) + self.above).min(self.heights[0])
     }
 
-    /// The stages by their index, each with the rows of its level that it computes next, in order.
-    fn parts(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
+    /// In order, the index of a stage and the rows of its level that it computes next.
+    fn bands(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
         let last = self.lags.last().copied().unwrap_or(0);
         let steps = (self.heights[0] + last).div_ceil(self.band);
         let order = (0..steps).flat_map(|step| (0..self.stages.len()).map(move |i| (step, i)));
         order
             .map(|(step, i)| (i, self.front(step, i)..self.front(step + 1, i)))
-            .filter(|part| !part.1.is_empty())
+            .filter(|band| !band.1.is_empty())
     }
 
-    /// Rows that stage `i` has computed after this many steps.
+    /// Rows that stage `i` has computed after `steps` steps.
     fn front(&self, steps: usize, i: usize) -> usize {
         let level = self.stages[i].level().unwrap_or(0);
         let rows = (steps * self.band).saturating_sub(self.lags[i]);
@@ -162,7 +162,7 @@ mod tests {
         stages
     }
 
-    /// Rows of level 0 that a row of a stage stands for, and those that it reads.
+    /// Rows of level 0 that a row of a stage covers, and those that it reads.
     fn seen(stage: Stage, row: usize, height: usize) -> [Range<usize>; 2] {
         let z = stage.level().unwrap_or(0);
         let reach = reach(stage);
@@ -170,12 +170,12 @@ mod tests {
         [rows(row, row + 1), rows(row.saturating_sub(reach), row + 1 + reach)]
     }
 
-    /// Goes through the parts of a wavefront; the first rule that they break, if any.
+    /// Checks the order of a wavefront; returns the first broken rule.
     fn broken(wavefront: &Wavefront) -> Option<String> {
         let (stages, height) = (&wavefront.stages[..], wavefront.heights[0]);
         // Rows of level 0 that each stage has computed, from the top.
         let mut done = vec![0; stages.len()];
-        for (i, rows) in wavefront.parts() {
+        for (i, rows) in wavefront.bands() {
             for row in rows {
                 let [own, around] = seen(stages[i], row, height);
                 if own.start != done[i] {
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn stages_find_what_they_read_and_spoil_nothing() {
+    fn stages_read_complete_rows_and_overwrite_no_needed_ones() {
         for height in [1, 2, 7, 16, 61, 300, 401] {
             let range = DisparityRange::new(0, 63).unwrap();
             let plan = Plan::new(40, height, range, &Method::default()).unwrap();
@@ -218,11 +218,11 @@ mod tests {
         }
     }
 
-    /// Whether a ring of so many parts keeps each part until nobody needs it any more: a part is there from its upper halo on.
+    /// Whether a ring of `count` parts keeps each part, upper halo included, as long as it is needed.
     fn fits_ring(wavefront: &Wavefront, part: usize, count: usize) -> bool {
         let (stages, height) = (&wavefront.stages[..], wavefront.heights[0]);
         let mut there = vec![0; count];
-        wavefront.parts().all(|(i, rows)| {
+        wavefront.bands().all(|(i, rows)| {
             rows.into_iter().all(|row| {
                 let [own, _] = seen(stages[i], row, height);
                 if i == 0 {
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn rings_keep_what_is_needed() {
+    fn rings_keep_all_needed_parts() {
         for height in [61, 300, 401] {
             let range = DisparityRange::new(0, 63).unwrap();
             let plan = Plan::new(40, height, range, &Method::default()).unwrap();
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn stages_that_look_at_the_whole_image_are_declined() {
+    fn stages_on_the_whole_image_prevent_a_wavefront() {
         let plan = Plan::new(40, 400, DisparityRange::new(0, 63).unwrap(), &Method::default()).unwrap();
         let (mut held, steps) = (plan.clone(), schedule::estimate(&plan));
         assert!(pass(&mut held, steps.clone()).len() > steps.len() && held.held < plan.held);
@@ -262,31 +262,31 @@ mod tests {
         }
     }
 
-    /// Every row of every stage runs once, with the messages that there were when the stage began.
+    /// Every row of every stage runs once, with the messages that existed when the stage started.
     #[test]
-    fn parts_are_the_stages() {
+    fn bands_cover_every_stage() {
         let plan = Plan::new(40, 400, DisparityRange::new(0, 63).unwrap(), &Method::default()).unwrap();
         let steps = schedule::estimate(&plan);
-        let parts = pass(&mut plan.clone(), steps.clone());
+        let bands = pass(&mut plan.clone(), steps.clone());
         let rows = |steps: &[Step]| {
             let mut rows = std::collections::BTreeMap::new();
             for step in steps {
                 let Step::Run(run) = step else { continue };
                 for run in split(run.clone()) {
                     let height = plan.levels[run.stage.level().unwrap_or(0)].height;
-                    let count = run.part.as_ref().map_or(height, |part| part.rows.len());
+                    let count = run.band.as_ref().map_or(height, |band| band.rows.len());
                     *rows.entry(run.stage).or_insert(0) += count;
                 }
             }
             rows
         };
-        assert_eq!(rows(&parts), rows(&steps));
+        assert_eq!(rows(&bands), rows(&steps));
         let sent = |stage: Stage, first: bool| {
-            let mut parts = parts.iter().filter_map(|step| match step {
-                Step::Run(Run { stage: s, part: Some(part), .. }) if *s == stage => Some(part.sent),
+            let mut bands = bands.iter().filter_map(|step| match step {
+                Step::Run(Run { stage: s, band: Some(band), .. }) if *s == stage => Some(band.sent),
                 _ => None,
             });
-            if first { parts.next().unwrap() } else { parts.next_back().unwrap() }
+            if first { bands.next().unwrap() } else { bands.next_back().unwrap() }
         };
         assert!(!sent(Stage::Dependency(0), true).dependency);
         assert!(sent(Stage::Belief(1), true).dependency && sent(Stage::Belief(1), true).below);

@@ -1,4 +1,4 @@
-//! Beliefs of a level: all that a pixel knows of its labels, as a cost.
+//! Beliefs of a level: for each pixel, the total cost of each label.
 //!
 //! ```text
 //! b(p, k) = min(e(p, k)                                       the evidence
@@ -8,13 +8,13 @@
 //!               belief_most)
 //! ```
 //!
-//! at the labels k that p [has](super::label_window), and infinite at all others. m are the
-//! messages of the [`dependency`](super::dependency) factors, down and up those of the
-//! [`resolution`](super::resolution) factors; what has not been sent yet, or does not exist at the
-//! coarsest and at the finest level, counts as 0.
+//! at the labels k that p [has](super::label_window), and infinite at all others. m are the messages of the
+//! [`dependency`](super::dependency) factors; down and up are the messages of the
+//! [`resolution`](super::resolution) factors. Messages that have not been sent, or do not exist at the
+//! coarsest and the finest level, count as 0.
 //!
-//! ([`belief_most`](crate::plan::Plan::belief_most) is one message below infinity: a label that a
-//! pixel has stays below those it does not have, also after a message has been taken off.)
+//! ([`belief_most`](crate::plan::Plan::belief_most) is one message below infinity: labels that a pixel has
+//! stay below those that it does not have, even after a message is subtracted.)
 
 use super::{Data, Descriptor, Volume, volumes};
 use crate::plan::GRAPH_WINDOW;

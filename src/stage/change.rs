@@ -1,5 +1,4 @@
-//! How much the label map of level 0 has changed since the last time, which tells when message
-//! passing may end.
+//! The change of the label map of level 0 since the last time, which decides when message passing ends.
 //!
 //! ```text
 //! new(p) = the label of smallest belief (a cost), the lowest on ties
@@ -7,8 +6,8 @@
 //! old    = new, for the next time                    0 everywhere before the first
 //! ```
 //!
-//! The map has settled where this is not the first time and the change is at most
-//! [`settled_change`](crate::plan::Plan::settled_change), if there is one.
+//! The map has settled if this is not the first time and the change is at most
+//! [`settled_change`](crate::plan::Plan::settled_change). Without that limit it never settles.
 
 use super::{Data, Descriptor, Volume};
 

@@ -1,12 +1,13 @@
-//! The [`Confidence`](crate::backend::Map::Confidence) of each pixel by itself: by how much its label leads.
+//! The [`Confidence`](crate::backend::Map::Confidence) of a pixel: the lead of its label over the runner-up.
 //!
 //! ```text
 //! confidence = min(2 (RunnerUp - Best), 255)         for valid pixels; 255 without a runner-up
 //!              0                                     for pixels with a flag of INVALID
 //! ```
 //!
-//! It counts half units of belief, which are eighths of a nat. Votes weight pixels by it, and then
-//! [`support`](super::support) makes it that of its surroundings, by which [`far_plane`](super::far_plane) weights them.
+//! The unit is half a unit of belief, which is an eighth of a nat. Votes weight pixels by it; then
+//! [`support`](super::support) replaces it by the support of the neighbourhood, the weight in
+//! [`far_plane`](super::far_plane).
 
 use super::{Descriptor, Map, maps};
 

@@ -1,5 +1,5 @@
-//! The matching cost of level 0: how unlike the left pixel (x, y) and the right pixel (x - d, y)
-//! are, for the disparity d of each label, 0 ..= [`COST_MAX`](crate::plan::COST_MAX).
+//! The matching cost of level 0: the dissimilarity of the left pixel (x, y) and the right pixel (x - d, y)
+//! for the disparity d of each label, 0 ..= [`COST_MAX`](crate::plan::COST_MAX).
 //!
 //! Where x - d is outside the image or either pixel is masked, the cost is
 //! [`outside_cost`](crate::plan::Plan::outside_cost). Elsewhere

@@ -1,7 +1,8 @@
-//! What a match holds: the one table of volumes, maps, graphs and scratch memory.
+//! The data of a match: one table of volumes, maps, graphs and scratch memory.
 //!
-//! A row of [`Data::array`] says how a device stores a datum: the name by which shaders bind it, its words in a row, and how its rows lie
-//! over the image. Buffers, bindings, the memory of a plan, and the tests that hold descriptors against shaders follow from it.
+//! A row of [`Data::array`] defines how a device stores a datum: its name in shaders, its words per row, and
+//! the image rows that its rows cover. Buffers, bindings, the memory of a plan, and tests of descriptors
+//! follow from it.
 
 use crate::plan::patches::{self, PATCH, PATCH_WORDS};
 use crate::plan::votes::{self, Votes};
@@ -10,14 +11,13 @@ use crate::weights::{MedianWeights, patch_weights, vote_weights};
 use std::collections::HashSet;
 use std::ops::Range;
 
-/// Stands for "no label", in the right view where no left pixel projects.
+/// Marks pixels of the right view to which no left pixel projects.
 pub const NO_LABEL: u16 = u16::MAX;
 
-/// The belief that stands for "no runner-up".
+/// Stands for "no runner-up".
 pub const NO_RUNNER_UP: u16 = u16::MAX;
 
-/// A volume, in the layout \[y\]\[x\]\[slot\]\[label\] (slot only
-/// for dependency messages), unpadded, one value an element.
+/// A volume, in the unpadded layout \[y\]\[x\]\[slot\]\[label\] (slot only for dependency messages).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Volume {
     /// Matching cost: in cost units at level 0, in 1/256 cost units at coarser levels.
@@ -35,7 +35,7 @@ pub enum Volume {
 }
 
 impl Volume {
-    /// Whether it is there where there are so many levels: the finest has no messages from below, the coarsest none from above.
+    /// Whether a match with `levels` levels has it: the finest has no messages from below, the coarsest none from above.
     #[must_use]
     pub fn is_there(self, levels: usize) -> bool {
         match self {
@@ -45,7 +45,7 @@ impl Volume {
         }
     }
 
-    /// Bytes of a value, as it is stored.
+    /// Bytes per stored value.
     #[must_use]
     pub fn bytes(self, plan: &Plan) -> usize {
         match self {
@@ -55,7 +55,7 @@ impl Volume {
         }
     }
 
-    /// The level it belongs to.
+    /// The level that it belongs to.
     #[must_use]
     pub fn level(self) -> usize {
         match self {
@@ -69,28 +69,28 @@ impl Volume {
     }
 }
 
-/// A map of a match on its way, one value a pixel.
+/// An intermediate or final map of a match, one value per pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Map {
     /// Index of the label with the smallest belief, the lowest on ties.
     Label,
-    /// Its belief, in units.
+    /// Belief of that label, in units.
     Best,
-    /// The smallest belief of the labels more than one away, [`NO_RUNNER_UP`] if there is none.
+    /// The smallest belief of labels more than one away from it; [`NO_RUNNER_UP`] if there are none.
     RunnerUp,
     /// Label index of each pixel of the right view; [`NO_LABEL`] where no left pixel projects.
     RightLabel,
-    /// Its belief, in units; [`u16::MAX`] where no left pixel projects.
+    /// Belief of that label, in units; [`u16::MAX`] where no left pixel projects.
     RightBest,
     /// Disparity before post-processing, in 1/256 px.
     Raw,
-    /// Disparity as far as post-processing is done, in 1/256 px.
+    /// Disparity after the post-processing so far, in 1/256 px.
     Disparity,
     /// Bits of [`crate::maps::flag`].
     Validity,
     /// Confidence, 0 ..= 255.
     Confidence,
-    /// [`Self::Raw`] at full size, where the pair is matched at half of that.
+    /// [`Self::Raw`] at full size, if the pair is matched at half its size.
     FullRaw,
     /// [`Self::Disparity`] at full size.
     FullDisparity,
@@ -118,20 +118,20 @@ impl Map {
     pub const FULL: [Self; 4] =
         [Self::FullRaw, Self::FullDisparity, Self::FullValidity, Self::FullConfidence];
 
-    /// Every map that there is under `plan`.
+    /// Every map of a match by `plan`.
     #[must_use]
     pub fn all(plan: &Plan) -> Vec<Self> {
         let full: &[Self] = if plan.full.is_some() { &Self::FULL } else { &[] };
         [&Self::MATCHED, full].concat()
     }
 
-    /// Words that a device stores a pixel in, with the other maps in the same array.
+    /// Words per pixel of the device array that holds this map, shared with other maps.
     #[must_use]
     pub fn words(self) -> usize {
         if matches!(self, Self::Label | Self::Best | Self::RunnerUp) { 2 } else { 1 }
     }
 
-    /// (width, height) under `plan`, in pixels. At full size there are whole blocks of 2 x 2 pixels.
+    /// (width, height) in pixels. At full size, the blocks of 2 x 2 pixels are whole.
     #[must_use]
     pub fn size(self, plan: &Plan) -> (usize, usize) {
         let (width, height) = plan.size();
@@ -146,17 +146,17 @@ pub enum Data {
     Volume(Volume),
     /// A map.
     Map(Map),
-    /// What members are chosen by, at a level: at level 0 the left view.
+    /// The image that members are chosen by, for each level; at level 0 the left view.
     Guide(usize),
-    /// The guide of a level until it is complete.
+    /// The guide of a level while it is computed.
     NextGuide(usize),
     /// Members of the dependency factors of a level.
     Members(usize),
-    /// The factors that hold each pixel of a level: its members, transposed.
+    /// The factors that hold each pixel of a level: the transpose of the members.
     Incoming(usize),
     /// Label windows of a level: first label | number of labels with padding << 16.
     Windows(usize),
-    /// Label windows of a level that hold all labels.
+    /// Label windows of a level with all labels in each.
     FullWindows(usize),
     /// Lowest and highest candidate of each pixel of a level, for the windows of the next finer one.
     Candidates(usize),
@@ -164,9 +164,9 @@ pub enum Data {
     LabelRange(usize),
     /// The right view.
     Right,
-    /// The left view on its way to a device, in whole 8-bit levels: one word a pixel.
+    /// The left view as uploaded in whole 8-bit levels: one word per pixel.
     LeftWords,
-    /// The right view on its way to a device.
+    /// The right view as uploaded.
     RightWords,
     /// Census of the left view.
     LeftCensus,
@@ -174,27 +174,27 @@ pub enum Data {
     RightCensus,
     /// Weight of colour in the matching cost.
     Contrast,
-    /// The label map that the next one is compared with.
+    /// The previous label map, for comparison.
     LabelMap,
-    /// Squared differences of two label maps.
+    /// Squared differences of the last two label maps.
     Squares,
-    /// Their sums, by row: lower and upper half.
+    /// Sums of [`Self::Squares`] by row: lower and upper half.
     RowSums,
     /// Whether the label map has settled.
     Convergence,
-    /// Workgroups of the dispatches that become empty once it has.
+    /// Workgroup counts of indirect dispatches, zeroed once the label map has settled.
     Groups,
-    /// Output of a map stage that reads around a pixel, until it replaces [`Map::Disparity`].
+    /// Output of a map stage that reads a neighbourhood, before it replaces [`Map::Disparity`].
     NextDisparity,
-    /// The same for [`Map::Validity`] and [`Map::Confidence`].
+    /// Like [`Self::NextDisparity`], for [`Map::Validity`] and [`Map::Confidence`].
     NextFlags,
     /// Union-find forest of the speckle filter.
     Parents,
-    /// Sizes of its regions.
+    /// Sizes of the regions of the speckle filter.
     Sizes,
     /// Whether each row holds a valid pixel.
     KnownRows,
-    /// The row that each row takes its values from.
+    /// The row from which each row is filled.
     SourceRows,
     /// The labels that the right view sees at each pixel, for votes.
     Shown,
@@ -216,7 +216,7 @@ pub enum Data {
     MedianWeights,
     /// Spatial weights of the median of filled pixels.
     FillWeights,
-    /// The left view at full size, where the pair is matched at half of it.
+    /// The left view at full size, if the pair is matched at half its size.
     FullLeft,
     /// The right view at full size.
     FullRight,
@@ -224,22 +224,22 @@ pub enum Data {
     FullLeftCensus,
     /// Census of the right view at full size.
     FullRightCensus,
-    /// Costs of the four full-size pixels of a pixel, around its label.
+    /// Costs of the four full-size pixels of each pixel, for disparities around its label.
     BlockCosts,
 }
 
-/// How the rows of an array lie over the image.
+/// The image rows that the rows of an array cover.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// Rows of pixels of a level.
     Level(usize),
-    /// Rows of pixels of the full size of a pair that is matched at half of it.
+    /// Rows of pixels at full size, if the pair is matched at half its size.
     Full,
-    /// Rows of pixels of half the size of level 0.
+    /// Rows of half-size pixels of level 0.
     Half,
     /// Rows of patches.
     Patches,
-    /// A table without rows of the image, in one piece.
+    /// A table in one piece, without image rows.
     Table,
 }
 
@@ -257,7 +257,7 @@ impl Extent {
         }
     }
 
-    /// Rows of the full size, twice that of level 0, that a row spans.
+    /// Number of full-size rows (twice the size of level 0) per row.
     fn step(self) -> usize {
         match self {
             Self::Full | Self::Table => 1,
@@ -267,7 +267,7 @@ impl Extent {
         }
     }
 
-    /// The rows that show what `rows` of `other` show, with up to `around` more on either side.
+    /// The rows that cover `rows` of `other`, with up to `around` more on either side.
     #[must_use]
     pub fn rows_of(self, plan: &Plan, rows: &Range<u32>, other: Self, around: u32) -> Range<u32> {
         let (height, own, theirs) = (self.rows(plan) as u32, self.step() as u32, other.step() as u32);
@@ -279,46 +279,46 @@ impl Extent {
     }
 }
 
-/// Where an array lies.
+/// The memory that an array occupies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// In memory of its own.
     Own,
-    /// In the memory of this, which is never needed at the same time.
+    /// In the memory of an array that is never needed at the same time.
     In(Data),
-    /// In that of any volume that post-processing does not read, where one is large enough.
+    /// In any large enough volume that post-processing does not read.
     AnyVolume,
 }
 
-/// What an array holds when a match begins.
+/// The contents of an array when a match starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
-    /// Whatever the last match has left: a stage writes it before one reads it.
+    /// Unspecified: stages write it before they read it.
     Anything,
     /// Zeros.
     Zero,
-    /// A part of the pair or what the front end knows of it.
+    /// Part of the input: the pair, or data from the front end.
     Given,
-    /// The same in every match of the plan.
+    /// The same for every match of the plan.
     Constant,
 }
 
 /// How a device stores a datum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Array {
-    /// What shaders call it; a prefix or suffix says which part they mean (see [`Data::bound`]).
+    /// The name in shaders, to which they may add a prefix or suffix (see [`Data::bound`]).
     pub name: &'static str,
     /// 32-bit words in a row, padding included.
     pub words: usize,
-    /// How its rows lie over the image.
+    /// The image rows that its rows cover.
     pub extent: Extent,
-    /// The rows that are held: where a stage works on a band at a time, those of the largest band, from its first row on.
+    /// Number of rows held. If stages work on bands, this is the size of the largest band.
     pub rows: usize,
     /// Whether only a band is held.
     pub of_band: bool,
-    /// What it holds when a match begins.
+    /// Contents when a match starts.
     pub start: Start,
-    /// Where it lies.
+    /// The memory that it occupies.
     pub place: Place,
 }
 
@@ -327,7 +327,7 @@ impl Array {
         Self { name, words, extent, rows, of_band: false, start: Start::Anything, place: Place::Own }
     }
 
-    /// One word for each of so many entries.
+    /// A table of `words` words.
     const fn table(name: &'static str, words: usize) -> Self {
         Self::new(name, words, Extent::Table, 1)
     }
@@ -344,14 +344,14 @@ impl Array {
         Self { place, ..self }
     }
 
-    /// Its size in bytes, all rows held once.
+    /// Bytes of all rows held.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         4 * self.words as u64 * self.rows as u64
     }
 }
 
-/// Words of a row that begins at a multiple of [`ROW_ALIGN`] bytes.
+/// Words of a row, padded to a multiple of [`ROW_ALIGN`] bytes.
 fn padded(words: usize) -> usize {
     words.next_multiple_of(ROW_ALIGN / 4)
 }
@@ -360,7 +360,7 @@ impl Data {
     /// The left view.
     pub const LEFT: Self = Self::Guide(0);
 
-    /// How a device stores it: the table.
+    /// How a device stores this datum.
     #[must_use]
     #[rustfmt::skip]
     pub fn array(self, plan: &Plan) -> Array {
@@ -368,11 +368,11 @@ impl Data {
         let votes = || Votes::of(plan);
         let width = plan.levels[0].width;
         let rows = |name, words, extent: Extent| Array::new(name, words, extent, extent.rows(plan));
-        // Words of each pixel of a level, of level 0, and of the full size.
+        // `words` per pixel of a level, of level 0, or of the full size.
         let level = |name, z: usize, words: usize| rows(name, words * padded(plan.levels[z].width), Extent::Level(z));
         let fine = |name, words: usize| level(name, 0, words);
         let full = |name, words: usize| rows(name, words * padded(2 * width), Extent::Full);
-        // So many slots of labels a pixel.
+        // `slots` sets of labels per pixel.
         let slots = |name, volume: Volume, slots: usize| {
             let z = volume.level();
             let l = &plan.levels[z];
@@ -388,7 +388,7 @@ impl Data {
             rows(name, padded(votes().width * labels), Extent::Half).place(Place::AnyVolume)
         };
         match self {
-            // datum                           name                words a pixel, and of which rows
+            // datum                           name                words per pixel, and the rows covered
             Self::Volume(volume @ Volume::Cost(_)) => slots("cost", volume, 1),
             Self::Volume(volume @ Volume::Evidence(_)) => slots("evidence", volume, 1),
             Self::Volume(volume @ Volume::Dependency(_)) => slots("dependency", volume, plan.slots()).starting(Zero),
@@ -452,7 +452,7 @@ impl Data {
         }
     }
 
-    /// The words of an array that is the same in every match of the plan, or none.
+    /// The words of an array that is the same for every match of the plan; empty for others.
     #[must_use]
     pub fn constant(self, plan: &Plan) -> Vec<u32> {
         match self {
@@ -465,13 +465,13 @@ impl Data {
             Self::VoteWeights => vote_weights().concat(),
             Self::PatchShares => patch_weights(),
             Self::MedianWeights => MedianWeights::of(&plan.method).words(),
-            // What distance subtracts is the same for all steps.
+            // Spatial weights do not depend on the step.
             Self::FillWeights => MedianWeights::of_filled(&plan.method, [0; 2]).words(),
             _ => Vec::new(),
         }
     }
 
-    /// The level of data that each level has.
+    /// The level of data that exist per level.
     #[must_use]
     pub fn level(self) -> Option<usize> {
         match self {
@@ -488,7 +488,7 @@ impl Data {
         }
     }
 
-    /// Data of a level, coarser levels of which may lie beside it in one buffer, so that one dispatch sees all of them.
+    /// Data of a level that coarser levels may keep in one shared buffer, so that one dispatch can process them all.
     #[must_use]
     pub fn of_levels(z: usize) -> [Self; 9] {
         [
@@ -557,7 +557,7 @@ impl Data {
         maps.chain(others).collect()
     }
 
-    /// The data that belong to no level, one for each array that there is under `plan`.
+    /// The data that belong to no level, one for each array of `plan`.
     #[must_use]
     pub fn arrays_of_match(plan: &Plan) -> Vec<Self> {
         let mut names = HashSet::new();
@@ -565,7 +565,7 @@ impl Data {
         there.filter(|data| names.insert(data.array(plan).name)).collect()
     }
 
-    /// Everything that a match by `plan` holds.
+    /// All data of a match by `plan`.
     #[must_use]
     pub fn all(plan: &Plan) -> Vec<Self> {
         let levels =
@@ -573,7 +573,7 @@ impl Data {
         levels.chain(Self::of_match()).filter(|data| data.is_there(plan)).collect()
     }
 
-    /// Whether a match by `plan` holds it.
+    /// Whether a match by `plan` has this datum.
     #[must_use]
     pub fn is_there(self, plan: &Plan) -> bool {
         let levels = plan.levels.len();
@@ -597,9 +597,9 @@ impl Data {
         }
     }
 
-    /// The name and the level of the array that a kernel at `level` binds by this name: that of the table, with `fine_` before it at the
-    /// next finer level, `source_` before it for other rows of it, and `_in` or `_out` behind it where one shader reads and writes it
-    /// in turn.
+    /// The table name and the level of the array that a kernel at `level` binds as `name`: the prefix `fine_`
+    /// means the next finer level, `source_` other rows, and the suffixes `_in` and `_out` the arrays that a
+    /// shader reads and writes in turn.
     #[must_use]
     pub fn place_of(name: &str, level: usize) -> (&str, usize) {
         let name = name.strip_suffix("_in").or(name.strip_suffix("_out")).unwrap_or(name);
@@ -612,7 +612,7 @@ impl Data {
         if (name, level) == ("guide", 0) { ("left", 0) } else { (name, level) }
     }
 
-    /// The data whose array a kernel at `level` binds by this name. Maps may share an array.
+    /// The data in the array that a kernel at `level` binds as `name`; several if maps share it.
     #[must_use]
     pub fn bound(plan: &Plan, name: &str, level: usize) -> Vec<Self> {
         let (name, level) = Self::place_of(name, level);
@@ -620,7 +620,7 @@ impl Data {
         Self::all(plan).into_iter().filter(is_meant).collect()
     }
 
-    /// The volume that it is, if it is one.
+    /// The volume, if this is one.
     #[must_use]
     pub fn volume(self) -> Option<Volume> {
         match self {
@@ -630,7 +630,7 @@ impl Data {
     }
 }
 
-/// Number of values in `volume` under `plan`, and labels in a row of them, without and with padding.
+/// (rows of labels, labels per row, labels per row with padding) of `volume`.
 #[must_use]
 pub fn volume_shape(plan: &Plan, volume: Volume) -> (usize, usize, usize) {
     let rows = if matches!(volume, Volume::Dependency(_)) { plan.slots() } else { 1 };
@@ -638,12 +638,12 @@ pub fn volume_shape(plan: &Plan, volume: Volume) -> (usize, usize, usize) {
     (level.pixels() * rows, level.labels, level.stride)
 }
 
-/// Values for a volume, as rows of labels to be stored with padding.
+/// Values of a volume as rows of labels, for storage with padding.
 pub(crate) struct PaddedRows<'a> {
     values: &'a [u32],
     labels: usize,
     stride: usize,
-    /// The padding is at least this, and a row's largest value.
+    /// Lower bound of the padding, which is also at least the largest value of the row.
     least: u32,
 }
 
@@ -651,7 +651,7 @@ impl<'a> PaddedRows<'a> {
     pub(crate) fn new(plan: &Plan, volume: Volume, values: &'a [u32]) -> Self {
         let (rows, labels, stride) = volume_shape(plan, volume);
         assert_eq!(values.len(), rows * labels, "values of {volume:?}");
-        // Padding must never look better than a label, also after a message is taken off a belief.
+        // Padding must never be better than a label, even after a message is subtracted from a belief.
         let least = match volume {
             Volume::Belief(_) => plan.volume_width.most().into(),
             _ => 0,

@@ -1,11 +1,10 @@
-//! Messages of the dependency factors of a level: a factor tells each member which labels the other
-//! members believe in, since all of them should show one surface.
+//! Messages of the dependency factors of a level: a factor tells each member the labels that the other
+//! members prefer, since all should lie on one surface.
 //!
-//! All messages are from the beliefs and the old messages before the stage; beliefs stay. Beliefs
-//! and messages are costs, and infinite is inf =
-//! [`VolumeWidth::most`](crate::plan::VolumeWidth::most). For the factor of pixel p whose members
-//! are the pixels p = p(0), p(1), ... of the level's [`graph`](super::graph), with b the belief of
-//! a member and m the factor's old message to it:
+//! The stage reads beliefs and old messages from before it, and does not change beliefs. Both are costs;
+//! infinity is inf = [`VolumeWidth::most`](crate::plan::VolumeWidth::most). Take the factor of pixel p with
+//! the members p = p(0), p(1), ... of the level's [`graph`](super::graph), the belief b of a member, and the
+//! factor's old message m to it:
 //!
 //! 1. From each member s to the factor, at label k:
 //!
@@ -13,10 +12,10 @@
 //!    q(s, k) = b(p(s), k) - m(s, k)         inf where b(p(s), k) is
 //!    ```
 //!
-//!    Where the rule is [`Absolute`](crate::plan::TruncationRule::Absolute), each finite q(s, k) is
-//!    lowered by the minimum of q(s) over the labels that p has, but not below 0.
-//! 2. To each member t, the sum over the others, truncated by [`Plan::dependency`], whose cost of
-//!    disagreement is tau:
+//!    If the rule is [`Absolute`](crate::plan::TruncationRule::Absolute), the minimum of q(s) over the labels
+//!    that p has is subtracted from each finite q(s, k), but not below 0.
+//! 2. To each member t, the sum over the others, truncated by [`Plan::dependency`] with the cost of
+//!    disagreement tau:
 //!
 //!    ```text
 //!    S(t, k) = min(sum of q(s, k) over s != t, inf)
@@ -27,18 +26,18 @@
 //!    absolute   low = 0, high = tau
 //!    ```
 //!
-//! Where [`Plan::label_step`] gives a cost for labels that differ by one, S(t, k) is replaced by
+//! If [`Plan::label_step`] defines a cost for labels that differ by one, S(t, k) is replaced by
 //!
 //! ```text
 //! min(S(t, k), S(t, k - 1) + step, S(t, k + 1) + step)
 //! ```
 //!
-//! in m(t, k), where S is infinite at labels that not both p and p(t) have. (Surfaces that slant have several labels within a factor. At
-//! coarse levels labels are wide apart, and the members would vote each other down.)
+//! in m(t, k), where S is infinite at labels that p or p(t) does not have. (Slanted surfaces have several
+//! labels within a factor. At coarse levels labels are far apart, and members would vote each other down.)
 //!
-//! At labels that p(t) has and p has not, S is infinite and the message is tau. Messages at labels
-//! that p(t) does not have are not defined. A factor of one member, and a slot without one, keep
-//! the message they have: 0, from the start.
+//! At labels that p(t) has and p does not, S is infinite and the message is tau. Messages at labels that p(t)
+//! does not have are undefined. A factor with one member, and an empty slot, keep their messages, which are 0
+//! from the start.
 //!
 //! [`Plan::dependency`]: crate::plan::Plan::dependency
 //! [`Plan::label_step`]: crate::plan::Plan::label_step

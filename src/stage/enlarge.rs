@@ -1,27 +1,27 @@
-//! The maps at full size of a pair that is matched at half of it: colours say on which side of an edge a pixel is.
+//! Upsamples the maps of a pair matched at half its size: colour decides on which side of an edge a pixel lies.
 //!
-//! A pixel p = (X, Y) of the full size is in the block of the pixel q0 = (floor(X / 2), floor(Y / 2)) of half the size. With low and
-//! high the range of the pair, in 1/256 px of the full size:
+//! A full-size pixel p = (X, Y) is in the block of the half-size pixel q0 = (floor(X / 2), floor(Y / 2)).
+//! With low and high the range of the pair, in 1/256 px at full size:
 //!
 //! ```text
 //! d(q) = clamp(2 Disparity(q), low, high)
-//! N    = those q of the 3 x 3 around q0 that are inside and have a disparity
+//! N    = the q of the 3 x 3 around q0 that are inside and have a disparity
 //! ```
 //!
-//! 1. Where q0 has no disparity, and where p is masked: the disparity is d(q0), and q* = q0.
-//! 2. Where the disparities d of N span at most 256, there is no edge, and q* = q0. With qx and qy the neighbours of q0 on
-//!    the side of p, to the left or right and above or below, and qxy the one beside both, clamped to the image and q0 where they have
-//!    no disparity:
+//! 1. If q0 has no disparity or p is masked: the disparity is d(q0), and q* = q0.
+//! 2. If the disparities d of N span at most 256, there is no edge, and q* = q0. qx and qy are the neighbours
+//!    of q0 on the side of p, horizontally and vertically, and qxy is the diagonal one, all clamped to the
+//!    image, and replaced by q0 if they have no disparity. The disparity is
 //!
 //!    ```text
 //!    floor((9 d(q0) + 3 d(qx) + 3 d(qy) + d(qxy) + 8) / 16)
 //!    ```
 //!
-//! 3. Elsewhere, with u(q) how unlike q is:
+//! 3. Otherwise, with the dissimilarity u(q):
 //!
 //!    ```text
-//!    u(q) = sum over red, green, blue of |colour of q at half the size - colour of p at full size|, in whole 8-bit levels
-//!           + AWAY times their distance along x and y, in pixels of the full size: (|4 x + 1 - 2 X| + |4 y + 1 - 2 Y|) / 2
+//!    u(q) = sum over red, green, blue of |half-size colour of q - full-size colour of p|, in whole 8-bit levels
+//!           + AWAY times their city block distance, in full-size pixels: (|4 x + 1 - 2 X| + |4 y + 1 - 2 Y|) / 2
 //!    q*   = the q of N of smallest u, the first in raster order on ties
 //!    w(q) = max(0, NEAR + u(q*) - u(q)) for the q of N with |d(q) - d(q*)| <= 256
 //!    ```
@@ -36,9 +36,9 @@
 use super::{Data, Descriptor, Map, maps};
 use crate::options::MatchSize;
 
-/// What each pixel of the full size that a pixel is away counts as a difference in colour, in 8-bit levels.
+/// Weight of a distance of one full-size pixel, as a difference in colour in 8-bit levels.
 pub const AWAY: i32 = 8;
-/// How much more unlike than the most similar pixel a pixel may be and still count, in 8-bit levels.
+/// Pixels count if their dissimilarity exceeds the smallest one by less than this, in 8-bit levels.
 pub const NEAR: i32 = 64;
 
 pub(super) const ROW: Descriptor = Descriptor {

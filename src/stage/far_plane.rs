@@ -1,19 +1,20 @@
-//! Extends planes of measured pixels, however far away, to the filled pixels that they fit, and to measured ones in doubt: a wall or a
-//! road goes on where nothing can be matched.
+//! Extends planes of measured pixels, over any distance, to filled pixels that they fit and to doubtful
+//! measured ones: walls and roads continue where nothing can be matched.
 //!
-//! Constants are those of [`patches`](crate::plan::patches). Patch (X, Y) stands for the pixels (4 X, 4 Y) to (4 X + 3, 4 Y + 3) that are
-//! inside. `>>` rounds down, / towards 0, and \[f\] is the sum of f over the pixels of a patch. What follows happens twice; the second
-//! time, there are planes from the first.
+//! The constants are in [`patches`](crate::plan::patches). Patch (X, Y) covers the pixels (4 X, 4 Y) to
+//! (4 X + 3, 4 Y + 3) inside the image. `>>` rounds down, / towards 0, and \[f\] is the sum of f over the
+//! pixels of a patch. Steps 1 to 5 run twice; the second time, the planes of the first exist.
 //!
 //! 1. The weight w of a pixel is its [`Confidence`](crate::backend::Map::Confidence), and 0 with a flag of
-//!    [`INVALID`](crate::maps::flag::INVALID). Where there is a plane, of value Q at the pixel (5), it is
+//!    [`INVALID`](crate::maps::flag::INVALID). Where a plane exists, with value Q at the pixel (step 5), it is
 //!
 //!    ```text
 //!    (Confidence max(1024 - |D - Q|, 0)) >> 10              disparity D, in 1/256 px
 //!    ```
 //!
-//! 2. The moments of a patch: x and y are the places of its pixels from its middle, in half pixels, -3, -1, 1 or 3, D' the disparity of the
-//!    first pixel with w > 0 in reading order, and e = clamp((D - D') >> 4, -`PATCH_SPREAD`, `PATCH_SPREAD`). They are 0 where all w are.
+//! 2. The moments of a patch: x and y are the positions of its pixels relative to its middle, in half pixels (-3, -1, 1 or 3), D' is the
+//!    disparity of the first pixel with w > 0 in reading order, and e = clamp((D - D') >> 4, -`PATCH_SPREAD`, `PATCH_SPREAD`). All moments
+//!    are 0 where all w are 0.
 //!
 //!    ```text
 //!    s = [w]                                  E = [w e] / s
@@ -25,7 +26,7 @@
 //!    dd        = ([w e e] - [w e] E) / s                  1/256 px^2
 //!    ```
 //!
-//! 3. Moments are carried along rows, and then what rows have along columns. With m(i) the moments of the i-th patch of such a line:
+//! 3. Moments are carried along rows, and the results along columns. With m(i) the moments of the i-th patch of a row or column:
 //!
 //!    ```text
 //!    f(0) = m(0)           f(i) = m(i) and carried(f(i - 1))
@@ -34,28 +35,28 @@
 //!    ```
 //!
 //!    *Carried* to the next patch, the place changes by 4 px against the step, within `PATCH_REACH`, and the weight becomes
-//!    (weight share) >> 8. The share is the entry of [`patch_weights`](crate::weights::patch_weights) for the difference between both
-//!    patches, or the last one: the sum of the differences of their mean colours
-//!    ([as those of half-size pixels](super::vote_fill)), and, where both have weight of their own,
+//!    (weight share) >> 8. The share is the entry of [`patch_weights`](crate::weights::patch_weights) for the difference of the two patches,
+//!    or the last entry beyond it. The difference is the sum of the differences of their mean colours ([like those of half-size
+//!    pixels](super::vote_fill)) plus, where both have weight of their own,
 //!    max(|difference of their disparities| - `PATCH_STEP`, 0) >> `PATCH_STEP_BITS`.
 //!
-//!    A *and* B is A where B has no weight, and B where A has none. Else, with
+//!    A *and* B is A if B has no weight, and B if A has none. Otherwise, with
 //!
 //!    ```text
 //!    r = (weight of B << 10) / weight          weight = weight of A + weight of B
 //!    t = (r (1024 - r)) >> 10
-//!    u, v, h = place and disparity of B less those of A, within PATCH_AWAY and PATCH_APART
+//!    u, v, h = place and disparity of B minus those of A, within PATCH_AWAY and PATCH_APART
 //!    ```
 //!
-//!    place and disparity are those of A plus (u r + 512) >> 10 and so on, and a moment is that of A, a, and that of B, b, within
-//!    `PATCH_MOMENT`:
+//!    place and disparity are those of A plus (u r + 512) >> 10 and so on, and a moment is, with its values a
+//!    in A and b in B, within `PATCH_MOMENT`:
 //!
 //!    ```text
 //!    a + (((b - a) r + 512) >> 10) + ((p t + 2048) >> 12)      for dd + ((p t + 512) >> 10)
-//!    p = the product of two of u >> 8, v >> 8 and h >> 6: those of the moment
+//!    p = the product of the two of u >> 8, v >> 8 and h >> 6 that the moment names
 //!    ```
-//! 4. The plane of a patch whose sum has a weight of at least `PATCH_LEAST`; others have none. xx and yy grow by `PATCH_RIDGE`. p is the
-//!    axis with the larger of both, x on ties, q the other one. Slopes are in 1/8192.
+//! 4. A patch whose sum has a weight of at least `PATCH_LEAST` has a plane; others have none. xx and yy grow by `PATCH_RIDGE`. p is the
+//!    axis with the larger of both, x on ties, and q the other axis. Slopes are in 1/8192.
 //!
 //!    ```text
 //!    g = clamp((xy << 11) / pp, -2048, 2048)
@@ -66,24 +67,24 @@
 //!    rest       = dd - sum over both axes of (2 slope (m >> 10) + ((slope (m mod 1024)) >> 9))      m = xd, yd
 //!    ```
 //!
-//!    It is trusted where rest < max(`PATCH_RESIDUAL`, dd >> `PATCH_SHARE_BITS`): where it leaves a mean square of less than half a
-//!    px^2, or an eighth of the variance.
-//! 5. Its value at a pixel of the patch, in 1/256 px, with x and y in half pixels as above:
+//!    The plane is trusted if rest < max(`PATCH_RESIDUAL`, dd >> `PATCH_SHARE_BITS`): if the mean square
+//!    residual is less than half a px^2, or an eighth of the variance.
+//! 5. The value of the plane at a pixel of the patch, in 1/256 px, with x and y in half pixels as above:
 //!
 //!    ```text
 //!    Q = (value + ((slope of x x) >> 4) + ((slope of y y) >> 4) + 2) >> 2
 //!    ```
 //!
-//! After the second time, with Q of a trusted plane, clamped to the range of the disparities:
+//! After the second time, with the value Q of a trusted plane, clamped to the disparity range:
 //!
-//! - Pixels with [`FILLED`](crate::maps::flag::FILLED) take it, and keep their flags.
-//! - Other valid pixels with a confidence below `PATCH_DOUBT` and |D - Q| > `PATCH_OUTVOTES` take it, too. Their flags become
-//!   [`OUTVOTED`](crate::maps::flag::OUTVOTED) and `FILLED` alone, and their confidence 0.
+//! - Pixels with [`FILLED`](crate::maps::flag::FILLED) take Q and keep their flags.
+//! - Other valid pixels with a confidence below `PATCH_DOUBT` and |D - Q| > `PATCH_OUTVOTES` take Q too.
+//!   Their flags become [`OUTVOTED`](crate::maps::flag::OUTVOTED) and `FILLED` only, and their confidence 0.
 //!
-//! (The confidence is what the surroundings [support](super::support). So patches of wrong matches count little against the
-//! plane around them.)
+//! (The confidence is the [support](super::support) of the neighbourhood, so patches of wrong matches have
+//! little weight against the plane around them.)
 //!
-//! (Moments and not sums: however far they come, they fit in 32 bits.)
+//! (Moments, unlike sums, fit in 32 bits over any distance.)
 
 use super::{Data, Descriptor, Map, maps};
 use crate::plan::patches;

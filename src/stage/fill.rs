@@ -1,18 +1,16 @@
-//! Fills the [`Disparity`](crate::backend::Map::Disparity) of invalid pixels from the farther side:
-//! what is occluded belongs to the farther surface.
+//! Fills the [`Disparity`](crate::backend::Map::Disparity) of invalid pixels from the farther side, because
+//! occluded pixels belong to the farther surface.
 //!
-//! A pixel is valid without a flag of [`INVALID`](crate::maps::flag::INVALID). Farther is the
-//! smaller of two disparities D, or the larger where
-//! [`nearer`](crate::options::RefinementOptions::nearer) is
+//! Pixels without a flag of [`INVALID`](crate::maps::flag::INVALID) are valid. The farther of two disparities
+//! D is the smaller one, or the larger one if [`nearer`](crate::options::RefinementOptions::nearer) is
 //! [`Smaller`](crate::options::Nearer::Smaller).
 //!
-//! 1. For each row r with a valid pixel, F(x, r) is the farther of the D of the nearest valid
-//!    pixels at or left of x and at or right of x, or that of the one there is.
-//! 2. Each pixel (x, y) that is invalid and not masked takes D = F(x, r), with r the nearest row
-//!    that has a valid pixel: y itself, if it does; the upper one on ties. It gets
-//!    [`FILLED`](crate::maps::flag::FILLED), and keeps its other flags.
+//! 1. For each row r with a valid pixel, F(x, r) is the farther of the D of the nearest valid pixels at or
+//!    left of x and at or right of x, or the D of the only one.
+//! 2. Each invalid pixel (x, y) that is not masked takes D = F(x, r) of the nearest row r with a valid pixel,
+//!    the upper one on ties. It gets [`FILLED`](crate::maps::flag::FILLED) and keeps its other flags.
 //!
-//! Where no pixel at all is valid, nothing is filled.
+//! If no pixel is valid, nothing is filled.
 
 use super::{Data, Descriptor, Map, maps};
 use crate::options::Fill;

@@ -1,15 +1,15 @@
-//! Lays planes through what surrounds filled pixels, twice: once far in all directions, then along
-//! rows, since there roads and floors stay at one disparity.
+//! Fits planes to the surroundings of filled pixels, twice: first far in all directions, then along rows,
+//! because disparity is constant along rows of roads and floors.
 //!
-//! For each of [`FILL_STEP_BITS`](crate::weights::FILL_STEP_BITS), (a, b) = (3, 3) and then (4, 0),
-//! from what the last has left: [`plane`](super::plane), or [`median`](super::median) where
+//! For each of [`FILL_STEP_BITS`](crate::weights::FILL_STEP_BITS), (a, b) = (3, 3) and then (4, 0), on the
+//! result of the previous one: [`plane`](super::plane), or [`median`](super::median) if
 //! [`plane`](crate::options::RefinementOptions::plane) is off, with these differences:
 //!
-//! - It changes the pixels with [`FILLED`](crate::maps::flag::FILLED), and no others.
-//! - Its places are (x + 2^a i, y + 2^b j) with |i| and |j| at most 6 and j even; the weights and
-//!   the plane count i and j, not pixels.
-//! - A plane looks at all of them.
-//! - The weights are those [`of_filled`](crate::weights::MedianWeights::of_filled) pixels.
+//! - It changes only the pixels with [`FILLED`](crate::maps::flag::FILLED).
+//! - The places are (x + 2^a i, y + 2^b j) with |i| and |j| at most 6 and j even; weights and plane use i and
+//!   j, not pixels.
+//! - A plane uses all places.
+//! - The weights are [`of_filled`](crate::weights::MedianWeights::of_filled).
 
 use super::{Data, Descriptor, Map, maps};
 use crate::plan::votes;

@@ -1,8 +1,7 @@
-//! One iteration within a level: [`dependency`](super::dependency), and then
-//! [`belief`](super::belief).
+//! One iteration within a level: [`dependency`](super::dependency), then [`belief`](super::belief).
 //!
-//! (They are one stage so that a belief can be summed while its messages are at hand; the values
-//! are those of the two stages in turn.)
+//! (As one stage, it can sum beliefs while their messages are in registers or caches. The values are those of
+//! the two stages.)
 
 use super::{Data, Descriptor, Volume, volumes};
 

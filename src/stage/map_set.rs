@@ -1,4 +1,4 @@
-//! All maps of a match on its way, from the labels on.
+//! All maps of a match in progress, from the labels on.
 
 use super::Map;
 use super::data::NO_RUNNER_UP;
@@ -7,7 +7,7 @@ use crate::maps::Maps;
 use crate::plan::Plan;
 use std::mem;
 
-/// All maps of a match on its way.
+/// All maps of a match in progress.
 pub(crate) struct MapSet {
     pub(crate) optima: Plane<Optimum>,
     pub(crate) right: Plane<u16>,
@@ -17,11 +17,11 @@ pub(crate) struct MapSet {
     pub(crate) disparity: Plane<i32>,
     pub(crate) validity: Plane<u8>,
     pub(crate) confidence: Plane<u8>,
-    /// The maps at full size, in whole blocks of 2 x 2 pixels; empty where the pair is matched at that size.
+    /// The maps at full size, in whole blocks of 2 x 2 pixels; empty if the pair is matched at full size.
     pub(crate) full: Maps,
 }
 
-/// The belief of one pixel around its optimum, in units.
+/// The optimum of the beliefs of one pixel, in units.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Optimum {
     pub(crate) label: u16,
@@ -52,7 +52,7 @@ impl MapSet {
         }
     }
 
-    /// What a match leaves behind: the maps at `full` size, or those of the size of the finest level.
+    /// The result of a match: the maps at `full` size, or at the size of the finest level.
     pub(crate) fn found(&self, full: bool) -> Maps {
         if full {
             return self.full.clone();

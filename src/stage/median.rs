@@ -1,15 +1,13 @@
-//! Weighted median of [`Disparity`](crate::backend::Map::Disparity), which removes outliers and
-//! keeps edges, where the left image has them too.
+//! Weighted median of [`Disparity`](crate::backend::Map::Disparity): removes outliers, and keeps edges that
+//! the left image shows too.
 //!
-//! 1. It changes the pixels that [`median`](crate::options::RefinementOptions::median) names: none,
-//!    the filled ones, or all that [have a disparity](crate::maps::has_disparity).
-//! 2. The places of pixel (x, y) are the pixels (x + i, y + j) that are inside and have a
-//!    disparity, with |i| and
-//!    |j| at most floor([`median_window`](crate::options::RefinementOptions::median_window) / 2),
-//!    and j even: every second row, the centre's among them.
-//! 3. With D the disparities before the stage and w the
-//!    [`MedianWeights`](crate::weights::MedianWeights) of the places, by what they are away in
-//!    space and in the colour of the left image:
+//! 1. It changes the pixels selected by [`median`](crate::options::RefinementOptions::median): none, the
+//!    filled ones, or all that [have a disparity](crate::maps::has_disparity).
+//! 2. The places of pixel (x, y) are the pixels (x + i, y + j) that are inside and have a disparity, with j
+//!    even and |i| and |j| at most floor([`median_window`](crate::options::RefinementOptions::median_window)
+//!    / 2): every second row, including the row of the centre.
+//! 3. With D the disparities before the stage and w the [`MedianWeights`](crate::weights::MedianWeights) of
+//!    the places, by their distance in space and in the colour of the left image:
 //!
 //!    ```text
 //!    w(i, j) = max(127 - space(i, j) - colour(i, j), 0)

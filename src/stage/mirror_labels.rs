@@ -1,5 +1,5 @@
-//! The labels that the match of the mirrored pair has found become those of the right view, for the
-//! left-right check. They stay when the pair itself is prepared.
+//! Turns the labels of the mirrored pair's match into those of the right view, for the left-right check. They
+//! stay when the pair itself is prepared.
 //!
 //! ```text
 //! RightLabel(x, y) = Label(width - 1 - x, y)

@@ -1,8 +1,9 @@
-//! The stages of the method: the one table that lists them, and what is true of each.
+//! The stages of the method: the table of all stages, and a descriptor of each.
 //!
-//! A row of [`for_every_stage`](crate::for_every_stage) gives the variant of [`Stage`] and the name of its files: `stage/NAME.rs`
-//! with its exact definition and its [`Descriptor`], `backend/cpu/stages/NAME.rs`, `backend/gpu/stages/NAME.rs`, `shaders/NAME.wgsl`, and the
-//! twin and the test of that name. Whatever needs a list of all stages follows from this table.
+//! A row of [`for_every_stage`](crate::for_every_stage) gives the variant of [`Stage`] and the name of its
+//! files: `stage/NAME.rs` with its exact definition and its [`Descriptor`], `backend/cpu/stages/NAME.rs`,
+//! `backend/gpu/stages/NAME.rs`, `shaders/NAME.wgsl`, and the twin and the test. All lists of stages are
+//! generated from this table.
 
 mod data;
 mod map_set;
@@ -14,8 +15,8 @@ pub(crate) use data::PaddedRows;
 pub use data::{Array, Data, Extent, Map, NO_LABEL, NO_RUNNER_UP, Place, Start, Volume, volume_shape};
 pub(crate) use map_set::{MapSet, Optimum};
 
-/// Calls the macro `$then` with all rows: the stages that run at a level and those that run on the volumes of level 0, of both kinds
-/// apart the ones that can go row by row, and the stages that look at maps alone, in the order in which a match runs them.
+/// Calls the macro `$then` with all rows: stages that run at a level, stages on the volumes of level 0 (in
+/// both groups, those that can run on bands of rows come separately), and map stages in the order of a match.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! for_every_stage {
@@ -36,24 +37,24 @@ macro_rules! for_every_stage {
     };
 }
 
-/// What is true of a stage, whoever runs it.
+/// Properties of a stage that hold for every backend.
 pub struct Descriptor {
-    /// What it reads at a level, and what it writes. What a level does not have is not read.
+    /// Data that it reads at a level; those that do not exist there are skipped.
     pub reads: fn(usize) -> Vec<Data>,
-    /// What it writes at a level.
+    /// Data that it writes at a level.
     pub writes: fn(usize) -> Vec<Data>,
-    /// Scratch memory of a device: written before it is read, and not needed once the stage has run.
+    /// Scratch memory on a device: written before it is read, and unused after the stage.
     pub needs: fn(usize) -> Vec<Data>,
-    /// How many rows around its own, of its level, it reads; `None` where it does not go row by row. (Resolution goes by rows of
-    /// the coarser level, and reads and writes those of their children.)
+    /// Number of rows around its own that it reads at its level; `None` if it cannot run on a band of rows.
+    /// (Resolution counts rows of the coarser level, and reads and writes those of their children too.)
     pub reach: Option<usize>,
-    /// Whether it may run at several levels at once: no level waits for what it does at another.
+    /// Whether it may run at several levels at once, because no level depends on its results at another.
     pub joins: bool,
-    /// Whether a match by a method runs it. Asked of the stages that look at maps alone.
+    /// Whether a match by this method uses it. Only consulted for map stages.
     pub taken: fn(&Method) -> bool,
-    /// About how long it takes on one thread, in ns: for a pixel of its level.
+    /// Approximate time on one thread, in ns per pixel of its level.
     pub pixel: f64,
-    /// And for a cell of its level: a label of a pixel.
+    /// Additional time in ns per cell (label of a pixel) of its level.
     pub cell: f64,
 }
 
@@ -71,12 +72,10 @@ impl Descriptor {
     };
 }
 
-/// Volumes, as data.
 fn volumes(volumes: &[Volume]) -> Vec<Data> {
     volumes.iter().copied().map(Data::Volume).collect()
 }
 
-/// Maps, as data.
 fn maps(maps: &[Map]) -> Vec<Data> {
     maps.iter().copied().map(Data::Map).collect()
 }
@@ -95,8 +94,8 @@ macro_rules! define {
         $( pub mod $finest_row_name; )*
         $( pub mod $map_name; )*
 
-        /// A stage of the method, with its level where it has one. The module of its name holds its exact definition, which the
-        /// CPU path, the shader and the naive twin in the tests follow independently.
+        /// A stage of the method, with its level if it has one. The module of the same name holds its exact definition, which
+        /// the CPU path, the shader and the naive twin in the tests implement independently.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum Stage {
             $( #[doc = concat!("See [`", stringify!($level_name), "`].")] $level(usize), )*
@@ -107,7 +106,7 @@ macro_rules! define {
         }
 
         impl Stage {
-            /// Every stage that there is for `plan`, whether its method takes it or not.
+            /// Every stage that exists for `plan`, whether its method uses it or not.
             #[must_use]
             pub fn all(plan: &Plan) -> Vec<Self> {
                 let of_level = (0..plan.levels.len())
@@ -122,10 +121,10 @@ macro_rules! define {
                 of_level.chain(finest).filter(is_there).collect()
             }
 
-            /// The stages that look at maps alone, in order.
+            /// The map stages, in order.
             pub const OF_MAPS: &[Self] = &[$( Self::$map ),*];
 
-            /// Its name: that of its files.
+            /// The name of the stage and of its files.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self {
@@ -137,7 +136,7 @@ macro_rules! define {
                 }
             }
 
-            /// What is true of it.
+            /// The properties of the stage.
             #[must_use]
             pub fn descriptor(self) -> &'static Descriptor {
                 match self {
@@ -149,13 +148,13 @@ macro_rules! define {
                 }
             }
 
-            /// Whether it looks at maps alone, and at the left image in the sizes that there are.
+            /// Whether it is a map stage: one that reads no volumes, only maps, the left image and tables.
             #[must_use]
             pub fn is_of_maps(self) -> bool {
                 Self::OF_MAPS.contains(&self)
             }
 
-            /// The level that it runs at; `None` for what there is at the finest one alone.
+            /// The level that it runs at; `None` if it exists at the finest level only.
             #[must_use]
             pub fn level(self) -> Option<usize> {
                 match self {
@@ -165,7 +164,7 @@ macro_rules! define {
                 }
             }
 
-            /// The same stage at the level that is `coarser` levels coarser.
+            /// This stage at a level coarser by `coarser`.
             #[must_use]
             pub fn coarser(self, coarser: usize) -> Self {
                 match self {
@@ -181,7 +180,7 @@ macro_rules! define {
 for_every_stage!(define);
 
 impl Stage {
-    /// The data that it reads, of those that there are under `plan`.
+    /// The data that it reads, if they exist in `plan`.
     pub fn reads(self, plan: &Plan) -> impl Iterator<Item = Data> + use<'_> {
         self.of_plan(self.descriptor().reads, plan)
     }
@@ -191,7 +190,7 @@ impl Stage {
         (self.descriptor().writes)(self.level().unwrap_or(0)).into_iter()
     }
 
-    /// Its scratch memory on a device, of what there is under `plan`.
+    /// Its scratch memory on a device, if it exists in `plan`.
     pub fn needs(self, plan: &Plan) -> impl Iterator<Item = Data> + use<'_> {
         self.of_plan(self.descriptor().needs, plan)
     }
@@ -200,37 +199,37 @@ impl Stage {
         data(self.level().unwrap_or(0)).into_iter().filter(|data| data.is_there(plan))
     }
 
-    /// Whether a match by `method` runs it. Only asked of stages that look at maps alone.
+    /// Whether a match by `method` uses it. Only called for map stages.
     #[must_use]
     pub fn is_taken(self, method: &Method) -> bool {
         (self.descriptor().taken)(method)
     }
 
-    /// The volumes that it reads or writes, each once a use.
+    /// The volumes that it reads or writes, repeated for each use.
     pub fn volumes(self, plan: &Plan) -> impl Iterator<Item = Volume> + use<'_> {
         self.reads(plan).chain(self.writes()).filter_map(Data::volume)
     }
 
-    /// Whether it needs volumes of level 0 that are not there where not all of its rows are held. (Costs alone are computed where
-    /// they are needed.)
+    /// Whether it needs volumes of level 0 that are not stored if only some rows are held. (Costs are
+    /// computed where they are needed.)
     #[must_use]
     pub fn needs_level_0(self, plan: &Plan) -> bool {
         self.volumes(plan).any(|volume| volume.level() == 0 && volume != Volume::Cost(0))
     }
 
-    /// Whether it computes messages or beliefs from others: what is done again in every iteration.
+    /// Whether it computes messages or beliefs from others, so that it runs in every iteration.
     #[must_use]
     pub fn passes_messages(self) -> bool {
         self.descriptor().joins && self.writes().any(|data| data.volume().is_some())
     }
 
-    /// The finest level that it touches.
+    /// The finest level that it reads or writes.
     #[must_use]
     pub fn finest_level(self, plan: &Plan) -> usize {
         self.volumes(plan).map(Volume::level).chain(self.level()).min().unwrap_or(0)
     }
 
-    /// About how long it takes on one thread, in ns.
+    /// Approximate time on one thread, in ns.
     #[must_use]
     pub fn work(self, plan: &Plan) -> f64 {
         let level = &plan.levels[self.level().unwrap_or(0)];

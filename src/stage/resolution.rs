@@ -1,27 +1,25 @@
-//! Messages of the resolution factors between a level (1 or coarser) and the next finer one, in
-//! both directions: a coarse pixel and its children should be at the same depth.
+//! Messages of the resolution factors between a level (1 or coarser) and the next finer one, in both
+//! directions: a coarse pixel and its children should be at the same depth.
 //!
-//! All messages are from the beliefs and the old messages before the stage; beliefs stay. Beliefs
-//! and messages are costs, and infinite is inf =
-//! [`VolumeWidth::most`](crate::plan::VolumeWidth::most). Each coarse pixel (x, y) has one factor:
-//! it is the parent P of its children (2 x, 2 y) to (2 x + 1, 2 y + 1), as far as they are inside.
-//! d is a disparity of the finer level and z one of the coarser. As
-//! [`Agreement`](crate::options::Agreement) says, they agree when
+//! The stage reads beliefs and old messages from before it, and does not change beliefs. Both are costs;
+//! infinity is inf = [`VolumeWidth::most`](crate::plan::VolumeWidth::most). Each coarse pixel (x, y) has one
+//! factor: it is the parent P of its children (2 x, 2 y) to (2 x + 1, 2 y + 1) inside the image. A disparity
+//! d of the finer level and z of the coarser agree, by the rule [`Agreement`](crate::options::Agreement), if
 //!
 //! ```text
 //! interpolating   |d - 2 z| <= 1            an odd d agrees with both of its coarse neighbours
 //! strict           d = 2 z                  an odd d agrees with none
 //! ```
 //!
-//! 1. From P and from each child c to the factor, with b the belief and m the factor's old message:
+//! 1. From P and from each child c to the factor, with the belief b and the factor's old message m:
 //!
 //!    ```text
 //!    q(P, z) = b(P, z) - m(P, z),   q(c, d) = b(c, d) - m(c, d)          inf where b is
 //!    ```
 //!
-//!    Where the rule is [`Absolute`](crate::plan::TruncationRule::Absolute), each finite q is
-//!    lowered by the minimum over its pixel's labels.
-//! 2. What each child says of coarse disparities, and the sums to parent and children:
+//!    If the rule is [`Absolute`](crate::plan::TruncationRule::Absolute), the minimum over the pixel's labels
+//!    is subtracted from each finite q.
+//! 2. The costs U of coarse disparities for each child, and the sums for parent and children:
 //!
 //!    ```text
 //!    U(c, z) = min of q(c, d) over the d that agree with z               inf if none does
@@ -30,8 +28,8 @@
 //!    S(c, d) = min of T(c, z) over the z that agree with d               inf if none does
 //!    ```
 //!
-//! 3. The messages, truncated by [`Plan::resolution`](crate::plan::Plan::resolution), whose cost of
-//!    disagreement is tau, at the labels that the pixel has:
+//! 3. The messages at the labels that the pixel has, truncated by
+//!    [`Plan::resolution`](crate::plan::Plan::resolution) with the cost of disagreement tau:
 //!
 //!    ```text
 //!    m = min(S, high) - low                 for P (up) and for each child (down)
@@ -41,8 +39,7 @@
 //!    absolute   low = 0, high = tau
 //!    ```
 //!
-//! Messages at labels that the pixel does not have are not defined. Before the first messages, all
-//! count as 0.
+//! Messages at labels that the pixel does not have are undefined. Messages that were never sent count as 0.
 
 use super::{Data, Descriptor, Volume, volumes};
 

@@ -1,9 +1,9 @@
-//! The labels of the right view, read from the beliefs of the left one: a right pixel takes the
-//! best of the labels that see it.
+//! The labels of the right view, from the beliefs of the left view: a right pixel takes the best of all
+//! labels that project to it.
 //!
-//! With low the smallest disparity, label k matches right pixel (x, y) with left pixel
-//! (x + low + k, y), whose belief of it is b(k), a cost. Among the k whose left pixel is in the
-//! columns [`core`](crate::plan::Plan::core) and [has](super::label_window) that label:
+//! With low the smallest disparity, label k matches right pixel (x, y) to left pixel (x + low + k, y), whose
+//! belief for it is the cost b(k). Among the k whose left pixel is in the columns
+//! [`core`](crate::plan::Plan::core) and [has](super::label_window) that label:
 //!
 //! ```text
 //! RightLabel(x, y) = the k of smallest b(k), the lowest on ties         NO_LABEL without any

@@ -1,16 +1,16 @@
-//! Flags pixels whose label nothing supports: ties, and regions too small to be trusted.
+//! Flags pixels whose label has no support: ties, and regions that are too small.
 //!
-//! 1. Of the pixels without a flag, those whose runner-up has the belief of the best label,
+//! 1. Unflagged pixels whose runner-up has the belief of the best label,
 //!    [`RunnerUp`](crate::backend::Map::RunnerUp) = [`Best`](crate::backend::Map::Best), get
 //!    [`TIE`](crate::maps::flag::TIE).
-//! 2. The pixels that are still without a flag form regions: two that share a side are connected
-//!    where their labels differ by at most 1.
+//! 2. The remaining unflagged pixels form regions: two that share a side are connected if their labels differ
+//!    by at most 1.
 //! 3. All pixels of a region of fewer than
 //!    [`speckle_size`](crate::options::RefinementOptions::speckle_size) pixels get
 //!    [`SPECKLE`](crate::maps::flag::SPECKLE).
 //!
-//! (A tie says that nothing tells the labels apart, as where an image is overexposed. The best
-//! label is then merely the lowest, in regions that may be large.)
+//! (In a tie nothing distinguishes the labels, for example where an image is overexposed. The best label is
+//! then just the lowest one, possibly in large regions.)
 
 use super::{Data, Descriptor, Map, maps};
 

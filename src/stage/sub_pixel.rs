@@ -1,9 +1,9 @@
-//! The disparity of every pixel of level 0 between the labels: at the tip of a symmetric V through
-//! the matching costs around its label, the steeper side setting the slope of both.
+//! The disparity of every pixel of level 0 between the labels: the tip of a symmetric V through the matching
+//! costs around its label; the steeper side sets the slope of both.
 //!
-//! 1. With cost(q, k) the level's cost of label k at pixel q, and L the label of the pixel, of
-//!    disparity low + L (low is the smallest disparity), over those q of its neighbourhood of 5
-//!    columns and 3 rows that are inside and whose own label is at most 2 from L:
+//! 1. With cost(q, k) the level's cost of label k at pixel q, and L the label of the pixel, of disparity
+//!    low + L (low is the smallest disparity), over the q of the neighbourhood of 5 columns and 3 rows that
+//!    are inside and whose label is at most 2 from L:
 //!
 //!    ```text
 //!    a = sum of cost(q, L - 1)      b = sum of cost(q, L)      c = sum of cost(q, L + 1)
@@ -16,17 +16,17 @@
 //!    offset = clamp(floor((256 (a - c) + s) / (2 s)), -256, 256)
 //!    ```
 //!
-//!    It is 0 where s <= 0, where L is the first or the last label of the level or
-//!    [`NO_LABEL`](crate::backend::NO_LABEL), and where
+//!    It is 0 if s <= 0, if L is the first or last label of the level or
+//!    [`NO_LABEL`](crate::backend::NO_LABEL), and if
 //!    [`sub_pixel`](crate::options::RefinementOptions::sub_pixel) is off.
 //! 3. [`Raw`](crate::backend::Map::Raw) and [`Disparity`](crate::backend::Map::Disparity) become
 //!    256 (low + L) + offset.
 //!
-//! - The cost and not the belief: the truncation of the messages flattens the belief beside its
-//!   optimum and draws a fit to whole labels.
-//! - Up to a whole label: beside a step between labels, messages often leave a pixel on the wrong
-//!   side of it.
-//! - More columns than rows: on the ground, disparities differ from row to row.
+//! - It uses costs, because truncation of messages flattens the belief beside its optimum, which biases a fit
+//!   to whole labels.
+//! - The offset may reach a whole label, because messages often leave a pixel on the wrong side of a step
+//!   between labels.
+//! - It uses more columns than rows, because on the ground disparities differ from row to row.
 
 use super::{Descriptor, Map, Volume, maps, volumes};
 

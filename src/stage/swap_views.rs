@@ -1,6 +1,5 @@
-//! The views exchange roles, both mirrored: the right view becomes the left one, its matches lie to
-//! the left again, and [`cost`](super::cost), [`sub_pixel`](super::sub_pixel) and the stages of
-//! maps then work on it.
+//! Exchanges and mirrors the views: the right view becomes the left one, with its matches to the left again,
+//! so that [`cost`](super::cost), [`sub_pixel`](super::sub_pixel) and the map stages can process it.
 //!
 //! With x' = width - 1 - x, all at once:
 //!
@@ -8,10 +7,10 @@
 //! left(x, y)       = right(x', y)           right(x, y)      = left(x', y)      pixels and masks
 //! Label(x, y)      = RightLabel(x', y)      RightLabel(x, y) = Label(x', y)
 //! Best(x, y)       = RightBest(x', y)       RightBest(x, y)  = Best(x', y)
-//! RunnerUp(x, y)   = 65535, which stands for none
+//! RunnerUp(x, y)   = 65535 (none)
 //! ```
 //!
-//! (The runners-up of the right view are not known.)
+//! (The runners-up of the right view are unknown.)
 
 use super::{Data, Descriptor, Map, maps};
 
@@ -25,7 +24,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     ..Descriptor::NONE
 };
 
-/// Both views, in the sizes that there are.
+/// Both views, at the sizes that exist.
 fn views() -> Vec<Data> {
     vec![Data::LEFT, Data::Right, Data::FullLeft, Data::FullRight]
 }

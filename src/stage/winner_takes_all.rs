@@ -1,12 +1,11 @@
-//! The label of each pixel of level 0, with its belief and the best that another surface could
-//! offer. Beliefs are costs.
+//! The label of each pixel of level 0, its belief, and the best belief of another surface (beliefs are costs).
 //!
 //! Among the labels k that the pixel [has](super::label_window), with b(k) their beliefs:
 //!
 //! ```text
 //! Label    = the k of smallest b(k), the lowest on ties
 //! Best     = b(Label)
-//! RunnerUp = min of b(k) over |k - Label| > 1        NO_RUNNER_UP, 65535, where there is no such k
+//! RunnerUp = min of b(k) over |k - Label| > 1        NO_RUNNER_UP, 65535, if there is no such k
 //! ```
 //!
 //! These are the maps [`Label`](crate::backend::Map::Label), [`Best`](crate::backend::Map::Best)

@@ -32,7 +32,7 @@ pub fn graphs(image: &Image, plan: &Plan) -> Vec<LevelGraph> {
     graphs
 }
 
-/// Prepares `backend` for a match of `pair` by `plan`, on `graphs`.
+/// Prepares `backend` for a match of `pair` by `plan`, with `graphs`.
 pub fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, graphs: &[LevelGraph]) {
     backend.prepare(plan, Prepared::new(pair)).unwrap();
     for (z, graph) in graphs.iter().enumerate() {
@@ -40,17 +40,17 @@ pub fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, graphs: &[Le
     }
 }
 
-/// Runs the message passing of `plan` on the evidence that `backend` holds; returns the number of iterations.
+/// Runs the message passing of `plan` on the evidence in `backend`; returns the number of iterations.
 pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
     run(backend, &schedule::flood(plan, |_| Vec::new()))
 }
 
-/// The same as [`flood`], from the costs that `backend` holds.
+/// Like [`flood`], from the costs in `backend`.
 pub fn flood_on_costs(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
     run(backend, &schedule::flood(plan, schedule::join))
 }
 
-/// Runs steps that pass messages; returns the number of iterations.
+/// Runs steps of message passing; returns the number of iterations.
 fn run(backend: &mut dyn Backend, steps: &[Step]) -> mrfgs::Result<u32> {
     let (mut iterations, mut steps) = (0, steps.iter());
     while let Some(step) = steps.next() {
@@ -69,7 +69,7 @@ fn run(backend: &mut dyn Backend, steps: &[Step]) -> mrfgs::Result<u32> {
     Ok(iterations)
 }
 
-/// Matches `pair` by `plan` in one piece, however much memory that takes.
+/// Matches `pair` by `plan` in one piece, regardless of memory.
 pub fn solve(
     backend: &mut dyn Backend,
     plan: &Plan,

@@ -13,7 +13,7 @@ use mrfgs::options::{
 };
 use std::ops::Range;
 
-/// Random label windows for a level of `plan`: all labels, the same part of them, or varying parts.
+/// Random label windows for a level of `plan`: all labels, one common window, or varying windows.
 pub fn windows(random: &mut Random, plan: &Plan, level: usize) -> Plane<[u16; 2]> {
     let l = &plan.levels[level];
     let all = l.stride as u16;
@@ -126,7 +126,7 @@ pub fn pair(random: &mut Random, width: usize, height: usize) -> Pair {
     Pair::new(left, right).unwrap()
 }
 
-/// Front-end options without corrections, so that the stages get the images unchanged.
+/// Front-end options without corrections, so that stages get unchanged images.
 pub fn as_it_is() -> FrontOptions {
     let mut front = FrontOptions::default();
     (front.level_rows, front.equal_sharpness, front.denoise) = (false, false, false);
@@ -223,7 +223,7 @@ pub struct State {
     pub up: Vec<Vec<u32>>,
     /// Beliefs.
     pub belief: Vec<Vec<u32>>,
-    /// The labels of every pixel.
+    /// The labels that every pixel has.
     pub has: Vec<Vec<Range<usize>>>,
 }
 
@@ -344,9 +344,9 @@ pub fn evidence(random: &mut Random, plan: &Plan) -> Vec<Vec<u32>> {
         .collect()
 }
 
-/// A state in the middle of message passing. Messages have minimum 0 and are at most their truncation, and
-/// are 0 for slots without a member and factors with a single one. Beliefs are the sums of their terms or, if
-/// `loose`, any values up to the largest belief and not below any message that is a term of them.
+/// A state during message passing. Messages have minimum 0 and are at most their truncation, and are 0 for
+/// slots without a member and factors with a single one. Beliefs are the sums of their terms or, if `loose`,
+/// any values up to the largest belief that are not below any message in them.
 pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: bool) -> State {
     let has = (0..plan.levels.len()).map(|z| twin::label_window::all(plan, z)).collect();
     state_within(random, plan, graphs, has, loose)
@@ -421,7 +421,7 @@ pub fn state_within(
     state
 }
 
-/// Maps that may occur after the estimate; if `filled`, with a validity that may occur after the fill.
+/// Plausible maps after the estimate; if `filled`, with a plausible validity after the fill.
 pub fn finest(random: &mut Random, plan: &Plan, filled: bool) -> Finest {
     let (width, height) = plan.size();
     let labels = plan.levels[0].labels as u32;
@@ -454,7 +454,7 @@ pub fn finest(random: &mut Random, plan: &Plan, filled: bool) -> Finest {
     maps
 }
 
-/// Flags that may occur before the fill or, if `filled`, after it.
+/// Plausible flags before the fill or, if `filled`, after it.
 fn flags(random: &mut Random, width: usize, height: usize, filled: bool) -> Plane<i32> {
     let density = random.pick(&[1, 2, 3, 10, 1000]);
     Plane::from_fn(width, height, |x, y| {

@@ -29,7 +29,7 @@ fn change() {
     });
 }
 
-/// A map settles when it changes by at most the tolerance, but not when it is seen for the first time.
+/// A map settles if it changes by at most the tolerance, but not the first time.
 #[test]
 fn a_map_settles() {
     let mut random = Random::new(3);
@@ -37,7 +37,7 @@ fn a_map_settles() {
     (method.graph.levels, method.schedule.tolerance) = (1, 0.5);
     let plan = random::plan((12, 9), 0, 7, &method);
     let pair = random::pair(&mut random, 12, 9);
-    // The label at every pixel but a few, and that at these.
+    // Beliefs with the label `few` at the first `moved` pixels, and `most` at the others.
     let belief = |(most, few): (usize, usize), moved: usize| {
         let best = |pixel: usize| if pixel < moved { few } else { most };
         (0..12 * 9 * 7).map(|i| u32::from(i % 7 != best(i / 7))).collect::<Vec<_>>()
@@ -45,7 +45,7 @@ fn a_map_settles() {
     for (name, mut backend) in backends() {
         for _ in 0..2 {
             backend.prepare(&plan, Prepared::new(&pair)).unwrap();
-            // 27 pixels that move by one are a mean square of a quarter.
+            // 27 pixels that change by one are a mean square of a quarter.
             let steps = [((0, 0), 0, false), ((0, 1), 28, false), ((0, 1), 1, true)];
             for (i, (labels, moved, settled)) in steps.into_iter().enumerate() {
                 backend.probe().write(Volume::Belief(0), &belief(labels, moved)).unwrap();

@@ -12,10 +12,10 @@ use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::{Plan, TruncationRule};
 use mrfgs::options::{Agreement, MatchingCost, Method, Order, Pyramid};
 
-/// A change of a plan, as a negative control makes it.
+/// A change of a plan for a negative control.
 type Change = fn(&mut Plan);
 
-/// Negative control: any single wrong element of any volume is detected and located.
+/// Negative control: a single wrong element of any volume is detected and located.
 #[test]
 fn control_one_wrong_element_is_found() {
     let mut random = Random::new(5);
@@ -59,7 +59,7 @@ fn control_one_wrong_element_is_found() {
     }
 }
 
-/// A case in which every parameter of every stage matters, and the volumes of a twin that follows `plan`.
+/// The volumes of the twin for `plan`, for a case in which every parameter of every stage matters.
 fn twin_of_the_control(plan: &Plan, pair: &Pair, graphs: &[LevelGraph]) -> Vec<(String, Vec<u32>)> {
     let (costs, mut state) = twin_start(plan, pair);
     twin_flood(plan, graphs, &mut state, Some(&costs));
@@ -69,7 +69,7 @@ fn twin_of_the_control(plan: &Plan, pair: &Pair, graphs: &[LevelGraph]) -> Vec<(
     all
 }
 
-/// Negative control: a twin that follows a slightly different plan is detected.
+/// Negative control: a twin with a slightly different plan is detected.
 #[test]
 fn control_a_changed_parameter_is_found() {
     let mut method = Method::default();
@@ -118,6 +118,6 @@ fn control_a_changed_parameter_is_found() {
         let differs = base.iter().zip(&other).any(|(a, b)| a.0 == *volume && a.1 != b.1);
         assert!(differs, "{name}: {volume} is the same");
     }
-    // The unchanged plan passes, against the backends.
+    // The unchanged plan passes on the backends.
     whole_flood(&plan, &pair);
 }

@@ -41,7 +41,7 @@ fn cost_with_the_largest_window() {
     }
 }
 
-/// Images of whole 8-bit levels, which go to a device in fewer bytes, and some that only seem to be of that kind.
+/// Images in whole 8-bit levels, which are uploaded in fewer bytes, and some that are nearly so.
 #[test]
 fn cost_of_8_bit_images() {
     let mut random = Random::new(32);
@@ -67,7 +67,7 @@ fn cost_of_8_bit_images() {
             let [left, right] = images;
             let pair = Pair::new(left, right).unwrap();
             let plan = random::plan((width, height), -3, 9, &Method::default());
-            // What an earlier pair of this size left behind does not show.
+            // Data of an earlier pair of this size must not affect the result.
             backend.prepare(&plan, Prepared::new(&pair)).unwrap();
             backend.probe().poison(0xa5).unwrap();
             backend.prepare(&plan, Prepared::new(&pair)).unwrap();

@@ -1,4 +1,4 @@
-//! The maps at full size of a pair that is matched at half of it.
+//! Maps at full size of a pair matched at half its size.
 
 use crate::common::compare::compare_maps;
 use crate::common::devices::backends;
@@ -13,7 +13,7 @@ use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use pollster::block_on;
 
-/// Disparities of slanted surfaces with a step between them, within the range and a little beyond it.
+/// Disparities of slanted surfaces with a step between them, within and slightly beyond the range.
 fn surfaces(random: &mut Random, plan: &Plan) -> Finest {
     let mut maps = random::finest(random, plan, true);
     let (low, high) = (256 * plan.range.min, 256 * plan.range.max);
@@ -62,7 +62,7 @@ fn enlarge() {
     }
 }
 
-/// Disparities at the ends of what a range may be do not overflow.
+/// Disparities at the ends of the largest ranges do not overflow.
 #[test]
 fn the_farthest_ranges() {
     let mut method = mrfgs::options::Method::default();
@@ -84,14 +84,14 @@ fn the_farthest_ranges() {
     }
 }
 
-/// Negative control: each part of the definition is seen.
+/// Negative control: a change of any part of the definition is detected.
 #[test]
 fn control_changed_edges_are_found() {
     let mut random = Random::new(9);
     let mut method = random::method(&mut random, 0);
     (method.graph.levels, method.schedule.match_size) = (1, mrfgs::options::MatchSize::Half);
     let plan = random::plan((60, 40), 0, 40, &method);
-    // Faint enough for colours to be near each other.
+    // Faint enough that colours are similar.
     let faint = |random: &mut Random| {
         Plane::from_fn(60, 40, |_, _| [0; 3].map(|_: i32| random.within(100, 140) as u8))
     };

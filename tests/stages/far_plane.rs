@@ -1,4 +1,4 @@
-//! Planes from far away.
+//! Far planes.
 
 use crate::common::compare::compare_finest;
 use crate::common::devices::backends;
@@ -13,7 +13,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::{Fill, Method};
 
-/// Slanted maps, most of whose pixels are valid; filled where they are neither valid nor masked.
+/// Slanted maps with mostly valid pixels; the others are filled unless masked.
 fn filled(random: &mut Random, plan: &Plan) -> Finest {
     let mut maps = slanted(random, plan);
     let few = random.one_in(4);
@@ -38,7 +38,7 @@ fn far_plane() {
 
 const SIZE: (usize, usize) = (300, 120);
 
-/// The disparities, in 1/256 px, of a slanted wall that is measured in its first 120 columns, and filled with 9 px elsewhere.
+/// The result in 1/256 px for a slanted wall that is measured in its first 120 columns, and filled with 9 px elsewhere.
 fn wall(image: &Image, measured: impl Fn(usize, usize) -> i32) -> Vec<(String, Plane<i32>)> {
     let plan = random::plan(SIZE, 0, 64, &Method::default());
     let pair = Pair::new(image.clone(), image.clone()).unwrap();
@@ -50,7 +50,7 @@ fn wall(image: &Image, measured: impl Fn(usize, usize) -> i32) -> Vec<(String, P
     run(&plan, &pair, &maps)
 }
 
-/// The disparities of all backends, which are those of the twin.
+/// The disparities of all backends, after a comparison with the twin.
 fn run(plan: &Plan, pair: &Pair, maps: &Finest) -> Vec<(String, Plane<i32>)> {
     let mut expected = maps.clone();
     twin::far_plane::far_plane(plan, pair, &mut expected);
@@ -70,9 +70,9 @@ fn slant(x: usize, y: usize) -> i32 {
     256 * 20 + 12 * x as i32 - 5 * y as i32
 }
 
-/// A wall goes on as far as its colour does, and not where what is measured is no plane.
+/// A wall continues as far as its colour, but not if the measured disparities form no plane.
 #[test]
-fn a_plane_goes_on_where_nothing_is_measured() {
+fn planes_continue_where_nothing_is_measured() {
     let plain = Image::from_rgb8(&Plane::filled(SIZE.0, SIZE.1, [90; 3]));
     for (name, disparity) in wall(&plain, slant) {
         for (x, y) in (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y))) {
@@ -91,7 +91,7 @@ fn a_plane_goes_on_where_nothing_is_measured() {
     }
 }
 
-/// Maps of a measured wall with a patch of 6 x 6 pixels that is off by 3 px, of `confidence`, and a pixel that is hardly off.
+/// A measured wall; 6 x 6 pixels are 3 px off with this `confidence`, and one pixel is slightly off.
 fn patched(confidence: i32) -> Finest {
     let mut maps = Finest::zero(SIZE);
     maps.disparity = Plane::from_fn(SIZE.0, SIZE.1, slant);
@@ -105,9 +105,9 @@ fn patched(confidence: i32) -> Finest {
     maps
 }
 
-/// A patch in doubt takes the plane around it, one that is sure does not, and neither does a pixel that is near the plane.
+/// A doubtful patch takes the plane around it; a sure patch does not, nor does a pixel near the plane.
 #[test]
-fn a_plane_outvotes_what_is_in_doubt() {
+fn planes_outvote_doubtful_patches() {
     let plan = random::plan(SIZE, 0, 64, &Method::default());
     let plain = Image::from_rgb8(&Plane::filled(SIZE.0, SIZE.1, [90; 3]));
     let pair = Pair::new(plain.clone(), plain).unwrap();
@@ -130,9 +130,9 @@ fn a_plane_outvotes_what_is_in_doubt() {
     }
 }
 
-/// Negative control: one pixel less, or one that is a little off, is found.
+/// Negative control: one missing or slightly wrong pixel is detected.
 #[test]
-fn one_pixel_is_found() {
+fn control_one_wrong_pixel_is_found() {
     let size = (24, 16);
     let plan = random::plan(size, 0, 64, &Method::default());
     let flat = Image::from_rgb8(&Plane::filled(size.0, size.1, [90; 3]));
@@ -163,7 +163,7 @@ fn one_pixel_is_found() {
     }
 }
 
-/// The largest disparities and weights: no number leaves its 32 bits. The twin has 64, and would tell.
+/// The largest disparities and weights fit in 32 bits: the twin, with 64 bits, gives the same.
 #[test]
 fn the_largest_moments_fit() {
     let size = (600, 12);

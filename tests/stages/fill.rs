@@ -1,4 +1,4 @@
-//! The fill.
+//! Filling from neighbours.
 
 use crate::common::devices::backends;
 use crate::common::random::{self, Random};
@@ -33,7 +33,7 @@ fn fill() {
     on_maps(Stage::Fill, 60, |_, _| (), input, |plan, _, maps| twin::fill::fill(plan, maps));
 }
 
-/// What is nearer by smaller disparities is nearer by larger ones in a mirror, where disparities change their sign.
+/// In a mirror, disparities change sign, so that the nearer ones are the larger instead of the smaller.
 #[test]
 fn fill_in_a_mirror() {
     let mut random = Random::new(8);

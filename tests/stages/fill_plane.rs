@@ -1,4 +1,4 @@
-//! Planes through what is around filled pixels.
+//! Planes for filled pixels.
 
 use crate::common::twin;
 use crate::maps::on_maps;

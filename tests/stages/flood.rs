@@ -1,4 +1,4 @@
-//! The sweep of a level.
+//! One iteration within a level.
 
 use crate::common::random::{self, Random};
 use crate::common::twin;
@@ -25,10 +25,9 @@ fn flood() {
     });
 }
 
-/// On the CPU path every thread sweeps bands of its own: beliefs around their borders must be summed at the
-/// right time.
+/// Every thread of the CPU path sweeps its own bands; beliefs near borders must wait for their messages.
 #[test]
-fn a_sweep_in_bands_is_a_sweep() {
+fn sweeps_in_bands_equal_the_two_stages() {
     let mut random = Random::new(11);
     for preset in ["default", "paper"] {
         // The rows do not divide evenly into bands.
@@ -52,7 +51,7 @@ fn a_sweep_in_bands_is_a_sweep() {
         for threads in [1, 2, 3] {
             assert!(run(threads, &[Stage::Flood(0)]) == expected, "{preset}, {threads} threads");
         }
-        // Control: summing beliefs before the messages are sent gives different ones.
+        // Control: summing beliefs before messages are sent gives a different result.
         assert!(run(2, &[Stage::Belief(0), Stage::Dependency(0)]) != expected, "{preset}");
     }
 }

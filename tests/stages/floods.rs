@@ -1,4 +1,4 @@
-//! Whole runs of message passing, against the twins on a separate schedule.
+//! Whole runs of message passing, against twins with a separate schedule.
 
 use crate::common::compare::compare_finest;
 use crate::common::devices::backends;
@@ -14,10 +14,9 @@ use mrfgs::options::{Agreement, MatchingCost, Order, PRESETS, Potential};
 use pollster::block_on;
 use std::collections::HashSet;
 
-/// Message passing continues correctly from volumes that were written, whatever a backend stores in the
-/// padding.
+/// Message passing continues correctly from written volumes, whatever a backend stores in the padding.
 #[test]
-fn a_flood_goes_on_from_a_written_state() {
+fn message_passing_continues_from_a_written_state() {
     on_all(|case, backend, random| {
         for loose in [false, true] {
             let mut state = case.state(random, loose);
@@ -51,12 +50,12 @@ fn a_flood_goes_on_from_a_written_state() {
     });
 }
 
-/// The schedule a second time, on the twins: all levels together, or coarse ones first. When a level is
-/// added, it exchanges resolution messages with the next coarser one before its own dependency messages
-/// start, so the first iteration needs no exchange. At level 0 the coarser levels send messages in every
-/// other iteration only, and levels whose messages can no longer reach level 0 send none.
+/// An independent implementation of the schedule on the twins: all levels together, or coarse levels first. A
+/// level that joins exchanges resolution messages with the next coarser one before its own dependency
+/// messages start, so its first iteration needs no exchange. At level 0 the coarser levels send messages only
+/// in every other iteration, and levels whose messages can no longer reach level 0 send none.
 ///
-/// A level that joins gets its windows and evidence from `costs`; without them, it has what `state` says.
+/// A level that joins gets its windows and evidence from `costs`; without them, it keeps those in `state`.
 pub(super) fn twin_flood(
     plan: &Plan,
     graphs: &[LevelGraph],
@@ -103,7 +102,7 @@ pub(super) fn twin_flood(
             let mut hear: Vec<usize> = (finest + 1..=last).collect();
             if method.schedule.order == Order::CoarseFirst {
                 if finest == 0 {
-                    // Messages between levels go one level at a time, in every second iteration.
+                    // Messages between levels advance by one level at a time, in every second iteration.
                     let exchanges = (i..iterations).filter(|j| j % 2 == 1).count();
                     speak.retain(|&z| z == 0 || (i % 2 == 0 && z <= exchanges));
                     hear.retain(|&z| i % 2 == 1 && z <= exchanges);
@@ -145,7 +144,7 @@ fn twin_read_out(plan: &Plan, cost: &[u32], belief: &[u32], maps: &mut twin::Fin
     twin::sub_pixel::sub_pixel(plan, cost, maps);
 }
 
-/// From the pair to the estimate, on every backend and on the twins; returns the number of iterations.
+/// From the pair to the estimate, on all backends and the twins; returns the number of iterations.
 pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
     let codes = twin::graph::graphs(pair.left(), plan);
     let graphs: Vec<LevelGraph> = codes
@@ -206,7 +205,7 @@ fn floods_of_the_presets() {
 }
 
 #[test]
-fn floods_of_every_kind() {
+fn floods_with_all_combinations_of_options() {
     let mut seed = 100;
     for schedule in [Order::Together, Order::CoarseFirst] {
         for potential in [Potential::Soft, Potential::Exact, Potential::Hard] {
@@ -228,7 +227,7 @@ fn floods_of_every_kind() {
 }
 
 #[test]
-fn floods_that_stop_by_themselves() {
+fn floods_that_stop_early() {
     let mut counts = HashSet::new();
     for (i, tolerance) in [0.05, 0.3, 0.6, 1.0, 3.0, 1e6, 1e-9].into_iter().enumerate() {
         for schedule in [Order::Together, Order::CoarseFirst] {

@@ -22,7 +22,7 @@ fn graph() {
     });
 }
 
-/// A graph that was set is the one that is read.
+/// A graph that was set is read back unchanged.
 #[test]
 fn a_graph_can_be_set() {
     on_all(|case, backend, _| {
@@ -36,7 +36,7 @@ fn a_graph_can_be_set() {
 }
 
 #[test]
-fn the_transposed_table_holds_every_member_once() {
+fn the_transposed_table_has_every_member_once() {
     for case in cases() {
         for graph in case.graphs.iter().chain(&graphs(case.pair.left(), &case.plan)) {
             let mut incoming = vec![Vec::new(); graph.width() * graph.height()];
@@ -68,7 +68,7 @@ fn downsample() {
     }
 }
 
-/// Negative control: a slightly larger range sigma moves a neighbour somewhere.
+/// Negative control: a slightly larger range sigma changes a neighbour somewhere.
 #[test]
 fn control_a_changed_sigma_is_found() {
     let mut random = Random::new(8);

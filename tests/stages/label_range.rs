@@ -1,4 +1,4 @@
-//! Costs outside the label range of their pixel.
+//! The limits of costs by label ranges.
 
 use crate::common::twin;
 use crate::{on_all, random_cost, same};
@@ -33,7 +33,7 @@ fn label_range() {
             backend.run(Stage::LabelRange(z)).unwrap();
             let expected = twin::label_range::label_range(&plan, z, label_range, &cost);
             same(&plan, backend, Volume::Cost(z), &expected)?;
-            // Control: the label range does matter.
+            // Control: the label range affects the result.
             if expected != cost {
                 let mut other = label_range.clone();
                 other.data_mut().fill([0, plan.levels[z].labels as u16 - 1]);

@@ -9,7 +9,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::options::Order;
 use std::cell::Cell;
 
-/// The windows of `level` after its stage has run, in the place of others where they are not all labels.
+/// The windows of `level` after its stage, which must replace other windows below the coarsest level.
 fn found(backend: &mut dyn Backend, plan: &Plan, level: usize) -> Plane<[u16; 2]> {
     if level + 1 < plan.levels.len() {
         let (runs, rows) = plan.levels[level].windows();
@@ -35,7 +35,7 @@ fn label_window() {
         }
         for z in 0..last {
             let labels = plan.levels[z + 1].labels;
-            // A surface, with some pixels far from it; ties.
+            // A surface, with some pixels far from it, and ties.
             let surface = random.within(0, labels as u32 - 1) as usize;
             let far = random.pick(&[2, 30, 1000]);
             let belief: Vec<u32> = (0..cells(&plan, z + 1))
@@ -43,7 +43,7 @@ fn label_window() {
                     if i % labels == surface && !random.one_in(far) {
                         random.within(1, 4)
                     } else if random.one_in(500) {
-                        // Just near enough to count, or not.
+                        // Just within or beyond the limit for candidates.
                         random.within(9, 13)
                     } else {
                         random.within(16, 25)
@@ -56,7 +56,7 @@ fn label_window() {
             if found(backend, &plan, z) != expected {
                 return Err(format!("windows of level {z}"));
             }
-            // Controls: some windows are narrower than all labels; another surface has other windows.
+            // Controls: some windows are narrower than all labels, and some are not.
             narrower.set(narrower.get() + usize::from(expected != full(&plan, z)));
             all.set(all.get() + 1);
         }

@@ -10,7 +10,7 @@ use mrfgs::low_level::plan::Plan;
 fn left_right_check() {
     let input = |random: &mut Random, plan: &Plan| {
         let mut maps = random::finest(random, plan, false);
-        // As the right view may be.
+        // Some pixels have no label, like in the right view.
         for label in maps.label.data_mut() {
             *label = if random.one_in(9) { NO_LABEL.into() } else { *label };
         }

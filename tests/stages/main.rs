@@ -1,6 +1,6 @@
 //! Every stage of every backend against its naive twin, bit for bit, on seeded random input of awkward sizes,
 //! and whole runs of message passing against a second implementation of the schedule. Negative controls show
-//! that the comparison can fail.
+//! that the comparisons can fail.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 #![allow(clippy::needless_range_loop, reason = "levels are counted, as in the schedule that is checked")]
@@ -34,7 +34,7 @@ use mrfgs::options::{MatchingCost, Pyramid};
 use std::collections::HashSet;
 use std::ops::Range;
 
-/// One pixel, one column, one row, odd, divisible by no power of two, and wider than any block.
+/// One pixel, one column, one row, odd sizes, other factors than two, and wider than any block.
 const SIZES: &[(usize, usize)] =
     &[(1, 1), (1, 9), (13, 1), (2, 2), (5, 7), (8, 8), (17, 11), (33, 6), (9, 40), (31, 19), (67, 3)];
 const LABELS: &[usize] = &[1, 2, 31, 32, 33, 64, 257];
@@ -42,7 +42,7 @@ const MINIMA: &[i32] = &[-20, 0, 5, 700, -900];
 const NEIGHBOURS: &[usize] = &[0, 1, 2, 4, 8, 12, 25, 48];
 /// Largest number of cells of the dependency messages of one case.
 const CELLS: usize = 1_000_000;
-/// Cases per size and number of labels, unless `MRFGS_ROUNDS` says another number.
+/// Cases per size and number of labels, unless `MRFGS_ROUNDS` is set.
 const ROUNDS: usize = 3;
 
 struct Case {
@@ -56,13 +56,13 @@ struct Case {
 }
 
 impl Case {
-    /// The labels of every pixel, by level.
+    /// The labels that every pixel has, by level.
     fn has(&self) -> Vec<Vec<Range<usize>>> {
         let levels = self.windows.iter().enumerate();
         levels.map(|(z, windows)| twin::label_window::ranges(&self.plan, z, windows)).collect()
     }
 
-    /// A state in the middle of message passing within the windows.
+    /// A state during message passing within the windows.
     fn state(&self, random: &mut Random, loose: bool) -> State {
         random::state_within(random, &self.plan, &self.graphs, self.has(), loose)
     }
@@ -82,14 +82,14 @@ impl Case {
     }
 }
 
-/// The [`rounds`] of all tests.
+/// The cases of all tests.
 fn cases() -> Vec<Case> {
     let given =
         std::env::var("MRFGS_ROUNDS").ok().map(|rounds| rounds.parse().expect("MRFGS_ROUNDS is a number"));
     rounds(given.unwrap_or(ROUNDS))
 }
 
-/// Every size with every number of labels in each round; everything else is drawn at random.
+/// `count` cases for every size and number of labels; everything else is random.
 fn rounds(count: usize) -> Vec<Case> {
     let mut cases = Vec::new();
     for (&size, &labels) in SIZES.iter().flat_map(|size| LABELS.iter().map(move |labels| (size, labels))) {
@@ -116,8 +116,8 @@ fn rounds(count: usize) -> Vec<Case> {
     cases
 }
 
-/// Runs `check` for every case on every backend, prepared and within the case's label windows, with a separate generator
-/// for each case.
+/// Runs `check` for every case on every backend, prepared with the case's label windows, with a separate
+/// random generator for each case.
 fn on_all(check: impl Fn(&Case, &mut dyn Backend, &mut Random) -> Result<(), String>) {
     for case in cases() {
         for (name, mut backend) in backends() {
@@ -142,7 +142,7 @@ fn cells(plan: &Plan, z: usize) -> usize {
     plan.levels[z].pixels() * plan.levels[z].labels
 }
 
-/// Costs of a level as it stores them: far apart, close together, or all equal.
+/// Stored costs of a level: far apart, close together, or all equal.
 fn random_cost(random: &mut Random, plan: &Plan, z: usize) -> Vec<u32> {
     let most = u32::from(COST_MAX) * if z == 0 { 1 } else { 256 };
     let most = random.pick(&[most, most, most / 20, 1, 0]);
@@ -150,7 +150,7 @@ fn random_cost(random: &mut Random, plan: &Plan, z: usize) -> Vec<u32> {
 }
 
 #[test]
-fn the_cases_cover_what_they_should() {
+fn the_cases_cover_all_kinds_of_plans() {
     let cases = rounds(ROUNDS);
     let seen = |f: &dyn Fn(&Plan) -> String| cases.iter().map(|c| f(&c.plan)).collect::<HashSet<_>>();
     assert_eq!(
@@ -168,7 +168,7 @@ fn the_cases_cover_what_they_should() {
         seen(&|p| format!("{} {}", p.range.min, p.levels[0].labels)).len(),
         MINIMA.len() * LABELS.len()
     );
-    // Windows that hold all labels, that are the same everywhere, and that differ.
+    // Windows with all labels, equal narrower windows, and differing windows.
     let narrower =
         |case: &&Case| case.windows[0].data().iter().any(|w| usize::from(w[1]) < case.plan.levels[0].stride);
     let differ = |case: &&Case| case.windows[0].data().iter().any(|w| w != &case.windows[0].data()[0]);

@@ -1,4 +1,4 @@
-//! Shared parts of the tests of stages that only read maps, and tests of several of these stages.
+//! Shared code for tests of map stages, and tests of several of them.
 
 use super::common::compare::compare_finest;
 use super::common::devices::backends;
@@ -13,7 +13,7 @@ use mrfgs::options::{Median, Method, Nearer};
 
 const SIZES: &[(usize, usize)] = &[(1, 1), (1, 9), (13, 1), (2, 2), (17, 11), (24, 31), (150, 4)];
 
-/// A stage by its definition.
+/// A twin of a map stage.
 pub(crate) type Twin = fn(&Plan, &Pair, &mut Finest);
 
 /// A plan with one level and no neighbours, for a random method.
@@ -25,8 +25,7 @@ pub(crate) fn small_plan(random: &mut Random, size: (usize, usize), change: impl
     random::plan(size, random.pick(&[-20, -1, 0, 5]), labels, &method)
 }
 
-/// Runs `stage` on the maps that `input` makes, for every size with many seeds, and compares all maps with
-/// the twin's.
+/// Runs `stage` on maps from `input`, for every size and many seeds, and compares all maps with the twin's.
 pub(crate) fn on_maps(
     stage: Stage,
     rounds: u64,
@@ -58,9 +57,9 @@ pub(crate) fn on_maps(
     }
 }
 
-/// Maps without any usable pixel: all masked, or all rejected.
+/// Maps without usable pixels: all masked, or all rejected.
 #[test]
-fn nothing_valid() {
+fn maps_without_valid_pixels() {
     for &size in SIZES {
         let mut random = Random::new(1);
         let plan = small_plan(&mut random, size, |m| {
@@ -97,11 +96,10 @@ fn nothing_valid() {
     }
 }
 
-/// A stage, whether its input has only the flags of the left-right check, its twin, and a change that makes
-/// the twin differ.
+/// (stage, whether its input only has flags of the left-right check, twin, change that makes it differ).
 pub(crate) type Control = (Stage, bool, Twin, fn(&mut Plan));
 
-/// Negative control: every stage detects a parameter that is slightly off, or a value that is.
+/// Negative control: a wrong parameter of any stage is detected.
 #[test]
 fn control_changes_are_found() {
     let region: Twin = |plan, _, maps| twin::speckle_filter::speckle_filter(plan, maps);
@@ -132,13 +130,13 @@ fn control_changes_are_found() {
     ]);
 }
 
-/// Runs such controls, each on every backend.
+/// Runs negative controls on every backend.
 pub(crate) fn control(changes: &[Control]) {
     let mut random = Random::new(21);
     let mut method = Method::default();
     (method.graph.levels, method.graph.percentile, method.refinement.median_window) = (1, 100.0, 5);
     let plan = random::plan((24, 31), 0, 9, &method);
-    // Faint enough for neighbours to have weight in the median.
+    // Faint enough that neighbours have weight in the median.
     let faint = Plane::from_fn(24, 31, |_, _| [0; 3].map(|_: i32| random.within(100, 130) as u8));
     let pair = Pair::new(Image::from_rgb8(&faint), texture(&mut random, 24, 31)).unwrap();
     let maps = loop {

@@ -16,7 +16,7 @@ pub(crate) fn any_method(random: &mut Random, method: &mut Method) {
     method.refinement.median_window = random.pick(&[3, 5, 15, 31]);
 }
 
-/// Random maps, sometimes with disparities as far apart as possible.
+/// Random maps, sometimes with disparities that are extremely far apart.
 pub(crate) fn any_maps(random: &mut Random, plan: &Plan) -> Finest {
     let mut maps = random::finest(random, plan, true);
     if random.one_in(4) {
@@ -55,7 +55,7 @@ fn median_weights() {
             let apart: u32 = (0..3).map(|c| guide(a[c]).abs_diff(guide(b[c]))).sum();
             let taken = twin::median::colour(a, b, range);
             assert_eq!(i64::from(apart << weights.doublings), taken, "{a:?}, {b:?}; sigma {range}");
-            // By the definition: all of the weight at 1270 sigmas in 8-bit levels.
+            // By definition, all weight is lost at a difference of 1270 sigmas in 8-bit levels.
             let levels: f64 = (0..3).map(|c| f64::from(a[c].abs_diff(b[c])) / 256.0).sum();
             let exact = 127.0 * levels / (1270.0 * range);
             let step = f64::from(1 << weights.doublings);

@@ -16,9 +16,9 @@ fn mirror_labels() {
         backend.run(Stage::MirrorLabels).unwrap();
         twin::mirror_labels::mirror_labels(&mut maps);
         compare_finest(backend, &maps)?;
-        // Control: labels that stay where they are, are noticed.
+        // Control: labels that are not mirrored are detected.
         assert_eq!(compare_finest(backend, &unmirrored).is_ok(), unmirrored == maps);
-        // They are there when the pair itself is matched.
+        // They stay when the pair itself is prepared.
         backend.prepare(&case.plan, Prepared::new(&case.pair.mirrored())).unwrap();
         let labels = block_on(backend.map(Map::RightLabel)).unwrap();
         if labels != maps.right_label {

@@ -1,4 +1,4 @@
-//! Planes through the disparities, from the weighted median on.
+//! Planes fitted to disparities, starting from the weighted median.
 
 use crate::common::devices::backends;
 use crate::common::random::{self, Random};
@@ -11,7 +11,7 @@ use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{Median, Method};
 
-/// Random maps, often with disparities that planes reach: slanted, with some noise and a few steps.
+/// Random maps, often with slanted disparities, with some noise and steps.
 pub(crate) fn slanted(random: &mut Random, plan: &Plan) -> Finest {
     let mut maps = any_maps(random, plan);
     if !random.one_in(3) {
@@ -31,8 +31,8 @@ fn plane() {
     on_maps(Stage::Plane, 30, any_method, slanted, twin::plane::plane);
 }
 
-/// The largest sums that there are: the largest window, with full weight everywhere, and disparities as far from each other and
-/// from the middle as they count. The twin looks at every number.
+/// The largest possible sums: the largest window, full weight everywhere, and disparities as far apart as
+/// they count. The twin checks every number.
 #[test]
 fn the_largest_sums_fit() {
     let size = (40, 40);
@@ -70,7 +70,7 @@ fn the_largest_sums_fit() {
     }
 }
 
-/// A slanted surface in steps of whole labels becomes smooth again.
+/// A slanted surface quantized to whole labels becomes smooth again.
 #[test]
 fn a_staircase_becomes_a_slope() {
     let size = (60, 30);

@@ -1,4 +1,4 @@
-//! Disparities of half-size pixels by the full size.
+//! Half-size disparities refined at full size.
 
 use crate::common::compare::{compare_finest, compare_maps};
 use crate::common::devices::backends;
@@ -12,11 +12,11 @@ use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{MatchSize, Method};
 
-/// Sizes of pairs that are matched at half of them.
+/// Sizes of pairs that are matched at half their size.
 pub(crate) const SIZES: &[(usize, usize)] =
     &[(1, 1), (2, 2), (1, 9), (13, 1), (5, 4), (33, 22), (47, 61), (300, 8)];
 
-/// A plan with one level for a pair of `size` that is matched at half of it, and that pair at half the size.
+/// A plan with one level for matching a pair of `size` at half its size, and the halved pair.
 pub(crate) fn halved(random: &mut Random, size: (usize, usize)) -> (Plan, Pair) {
     let mut method = random::method(random, 0);
     (method.graph.levels, method.schedule.match_size) = (1, MatchSize::Half);
@@ -25,7 +25,7 @@ pub(crate) fn halved(random: &mut Random, size: (usize, usize)) -> (Plan, Pair) 
     (plan, random::pair(random, size.0, size.1).halved())
 }
 
-/// Labels as a match may leave them: some far apart, most near their neighbours; a pixel of the right view may have none.
+/// Plausible labels of a match: some far apart, most near their neighbours; some pixels of the right view have none.
 pub(crate) fn labels(random: &mut Random, plan: &Plan) -> Finest {
     let mut maps = random::finest(random, plan, false);
     let most = plan.levels[0].labels as u32 - 1;
@@ -46,7 +46,7 @@ fn refine() {
         let mut maps = labels(&mut random, &plan);
         let input = maps.clone();
         twin::refine::refine(&plan, &pair, &mut maps);
-        // And of the views in each other's place.
+        // Also for exchanged views.
         let mut swapped = input.clone();
         swapped.raw = maps.raw.clone();
         swapped.disparity = maps.disparity.clone();
@@ -71,7 +71,7 @@ fn refine() {
     }
 }
 
-/// Negative control: each part of the fit is seen, also in what the backends compute, and so is the full size.
+/// Negative control: a change of any part of the fit, or of the full-size views, is detected.
 #[test]
 fn control_a_changed_fit_is_found() {
     let mut random = Random::new(3);

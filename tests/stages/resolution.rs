@@ -1,4 +1,4 @@
-//! The messages between levels.
+//! Messages between levels.
 
 use crate::{on_all, resolve, same};
 use mrfgs::low_level::backend::{Stage, Volume};

@@ -26,7 +26,7 @@ fn right_view() {
             let mut all = maps.clone();
             twin::right_view::right_view(&case.plan, &belief, &mut all);
             narrower.set(narrower.get() + usize::from(all != maps));
-            // Then a tile with its own core, in the same buffers.
+            // Then prepare a tile with another core in the same buffers.
             let start = random.within(0, width as u32 - 1) as usize;
             plan.core = start..random.within(start as u32 + 1, width as u32) as usize;
             backend.prepare(&plan, Prepared::new(&case.pair)).unwrap();

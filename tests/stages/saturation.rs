@@ -1,4 +1,4 @@
-//! Saturating sums, in 8 and in 16 bits.
+//! Saturating sums in 8 and 16 bits.
 
 use crate::common::devices::backends;
 use crate::common::prepare;
@@ -32,7 +32,7 @@ fn full_graphs(plan: &Plan) -> Vec<LevelGraph> {
     plan.levels.iter().map(graph).collect()
 }
 
-/// The strongest evidence for label 0, at every pixel.
+/// The strongest evidence for label 0 at every pixel.
 fn sure(plan: &Plan) -> Vec<Vec<u32>> {
     let evidence = |level: &LevelPlan| {
         let cap = u32::from(level.evidence.cap);
@@ -41,7 +41,7 @@ fn sure(plan: &Plan) -> Vec<Vec<u32>> {
     plan.levels.iter().map(evidence).collect()
 }
 
-/// Message passing on full graphs from the strongest evidence, on the twins and every backend; returns the
+/// Message passing on full graphs from the strongest evidence, on the twins and all backends; returns the
 /// largest belief.
 fn flood_of_the_sure(plan: &Plan) -> u32 {
     let (width, height) = plan.size();
@@ -63,9 +63,9 @@ fn flood_of_the_sure(plan: &Plan) -> u32 {
     state.belief.iter().flatten().copied().max().unwrap()
 }
 
-/// The largest possible in-degree, the strongest potential, the largest evidence: they fit in 16 bits.
+/// The largest in-degree, the strongest potential and the largest evidence fit in 16 bits.
 #[test]
-fn wide_beliefs_stay_below_their_largest() {
+fn wide_beliefs_never_saturate() {
     for (resolution, levels) in [(Agreement::Strict, 3), (Agreement::Interpolating, 2)] {
         let mut method = Method::preset("paper").unwrap();
         (method.graph.percentile, method.messages.agreement, method.graph.levels) = (0.0, resolution, levels);
@@ -80,8 +80,7 @@ fn wide_beliefs_stay_below_their_largest() {
     }
 }
 
-/// A plan of either width whose truncations are larger than a plan's own, so that beliefs exceed the width on
-/// full graphs.
+/// A plan of either width with such large truncations that beliefs saturate on full graphs.
 fn saturating(neighbours: usize, width: VolumeWidth, rule: TruncationRule, resolution: Agreement) -> Plan {
     let mut method = Method::default();
     method.graph.percentile = 100.0 - neighbours as f64 * 100.0 / 48.0;
@@ -99,7 +98,7 @@ fn saturating(neighbours: usize, width: VolumeWidth, rule: TruncationRule, resol
 }
 
 #[test]
-fn beliefs_that_saturate() {
+fn saturated_beliefs_equal_those_of_the_twins() {
     for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
         for rule in [TruncationRule::Relative, TruncationRule::Absolute] {
             for resolution in [Agreement::Strict, Agreement::Interpolating] {
@@ -110,18 +109,17 @@ fn beliefs_that_saturate() {
     }
 }
 
-/// Negative control: where every label's sum saturates, messages and beliefs carry no information; without
+/// Negative control: if the sums of all labels saturate, messages and beliefs carry no information; without
 /// saturation they would.
 #[test]
-fn control_saturated_sums_say_nothing() {
+fn control_saturated_sums_carry_no_information() {
     for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
         for resolution in [Agreement::Strict, Agreement::Interpolating] {
             let plan = saturating(48, width, TruncationRule::Relative, resolution);
             let pair = random::pair(&mut Random::new(3), 15, 13);
             let graphs = full_graphs(&plan);
             let tau = u32::from(plan.dependency.tau);
-            // Label 0 is slightly better everywhere, in beliefs and in messages that are not at their
-            // minimum.
+            // Label 0 is slightly better everywhere, in beliefs and in messages above their minimum.
             let better = |plan: &Plan, volume: Volume, most: u32| {
                 let (rows, labels, _) = volume_shape(plan, volume);
                 (0..rows * labels).map(|i| if i % labels == 0 { most - 5 } else { most }).collect::<Vec<_>>()
@@ -165,10 +163,10 @@ fn control_saturated_sums_say_nothing() {
     }
 }
 
-/// Negative control: padding must not look better than labels that all have the largest cost, even after its
+/// Negative control: padding must not be better than labels that all have the largest cost, even after its
 /// message is subtracted.
 #[test]
-fn control_padding_stays_behind_beliefs_that_saturate() {
+fn control_padding_stays_above_saturated_beliefs() {
     for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
         let plan = saturating(1, width, TruncationRule::Relative, Agreement::Interpolating);
         let level = &plan.levels[0];
@@ -201,16 +199,16 @@ fn control_padding_stays_behind_beliefs_that_saturate() {
     }
 }
 
-/// Where nothing saturates even if a pixel is in more factors than usual, and where it may saturate.
+/// The usual number of factors never saturates in narrow plans, nor the largest number in wide ones.
 #[test]
-fn every_plan_leaves_room_for_its_beliefs() {
+fn usual_beliefs_fit_the_width_of_every_plan() {
     let mut random = Random::new(11);
     let mut widths = HashSet::new();
     for _ in 0..2000 {
         let neighbours = random.pick(NEIGHBOURS);
         let plan = random::plan((9, 9), 0, 9, &random::method(&mut random, neighbours));
         let (dependency, resolution) = (u32::from(plan.dependency.tau), u32::from(plan.resolution.tau));
-        // As many as a factor has members in 8 bits, as many as possible in 16.
+        // The number of members of a factor in 8 bits, the largest possible number in 16.
         let factors = match plan.volume_width {
             VolumeWidth::Narrow => plan.neighbours as u32 + 1,
             VolumeWidth::Wide => 49,

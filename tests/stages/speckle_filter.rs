@@ -20,7 +20,7 @@ fn speckle_filter() {
         |random: &mut Random, method: &mut Method| method.refinement.speckle_size = random.pick(&sizes);
     let input = |random: &mut Random, plan: &Plan| {
         let mut maps = random::finest(random, plan, false);
-        // Flags that the left-right check may leave.
+        // Flags that the left-right check may set.
         for validity in maps.validity.data_mut() {
             *validity &= i32::from(flag::OUTSIDE | flag::OCCLUDED | flag::MASKED);
         }
@@ -31,7 +31,7 @@ fn speckle_filter() {
     });
 }
 
-/// A tie is flagged in a region of any size, and only there.
+/// Ties are flagged in a region of any size, and only there.
 #[test]
 fn ties() {
     let (width, height) = (70, 33);
@@ -54,12 +54,12 @@ fn ties() {
     }
 }
 
-/// Which pixels belong to a region.
+/// Whether a pixel belongs to a region.
 type Shape<'a> = &'a dyn Fn(usize, usize) -> bool;
 
-/// Regions whose shapes defeat shortcuts: a spiral, a comb, rows that meet only at their ends.
+/// Regions that defeat shortcuts: a spiral, a comb, rows that meet only at their ends.
 #[test]
-fn regions_that_wind() {
+fn winding_regions() {
     let (width, height) = (131, 70);
     let spiral = |x: usize, y: usize| {
         let ring = x.min(y).min(width - 1 - x).min(height - 1 - y);

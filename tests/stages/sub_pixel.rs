@@ -12,7 +12,7 @@ use mrfgs::low_level::backend::{Stage, Volume};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::Method;
 
-/// Labels among which neighbours are a few labels apart, as on a slanted surface, up to `apart`.
+/// Labels like on a slanted surface, with differences up to `apart`.
 fn slanted(random: &mut Random, plan: &Plan, apart: u32, maps: &mut Finest) {
     let labels = plan.levels[0].labels as u32;
     let first = random.within(0, labels - 1);
@@ -28,7 +28,7 @@ fn sub_pixel() {
             let belief: Vec<u32> = (0..cells(&case.plan, 0)).map(|_| random.within(0, most)).collect();
             let cost = random_cost(random, &case.plan, 0);
             let mut maps = random::finest(random, &case.plan, false);
-            // Labels that a match may leave.
+            // Plausible labels of a match.
             twin::winner_takes_all::winner_takes_all(&case.plan, &belief, &mut maps);
             let winners = maps.clone();
             for apart in [None, Some(1), Some(4)] {
@@ -47,7 +47,7 @@ fn sub_pixel() {
     });
 }
 
-/// Negative control: each part of the fit is seen on such labels, and offsets take all of their range.
+/// Negative control: a change of any part of the fit is detected, and offsets span their whole range.
 #[test]
 fn control_a_changed_fit_is_found() {
     let mut random = Random::new(31);

@@ -1,4 +1,4 @@
-//! The confidence that the pixels around a pixel support.
+//! The support of each pixel.
 
 use crate::common::compare::compare_finest;
 use crate::common::devices::backends;
@@ -12,7 +12,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::Method;
 
-/// Random maps whose disparities are near each other, but for some.
+/// Random maps with mostly similar disparities.
 fn near(random: &mut Random, plan: &Plan) -> Finest {
     let mut maps = random::finest(random, plan, false);
     let most = random.pick(&[300, 520, 2000]);
@@ -33,7 +33,7 @@ fn support() {
 
 const SIZE: (usize, usize) = (64, 40);
 
-/// The confidence of all backends, which are those of the twin.
+/// The support of each pixel, after comparing all backends with the twin.
 fn supported(maps: &Finest) -> Plane<i32> {
     let mut random = Random::new(5);
     let pair = random::pair(&mut random, SIZE.0, SIZE.1);
@@ -50,13 +50,13 @@ fn supported(maps: &Finest) -> Plane<i32> {
     expected.confidence
 }
 
-/// On one surface all keep what they have. A small patch that stands out, what is beside an edge, and what is beside filled pixels
-/// lose some of it.
+/// On a smooth surface, confidence stays the same. A small deviating patch, pixels beside an edge, and pixels
+/// beside filled ones lose some of it.
 #[test]
-fn what_stands_alone_is_not_sure() {
+fn isolated_disparities_lose_confidence() {
     let mut maps = Finest::zero(SIZE);
     maps.confidence = Plane::filled(SIZE.0, SIZE.1, 100);
-    // A slope of a tenth of a pixel for each pixel.
+    // A slope of a tenth of a pixel per pixel.
     maps.disparity = Plane::from_fn(SIZE.0, SIZE.1, |x, y| 26 * (x + y) as i32);
     assert!(supported(&maps).data().iter().all(|&c| c == 100));
 

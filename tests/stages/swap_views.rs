@@ -1,4 +1,4 @@
-//! The right view in place of the left one.
+//! The exchange of the views.
 
 use crate::common::compare::compare_finest;
 use crate::common::{random, twin};
@@ -13,17 +13,17 @@ fn swap_views() {
         backend.run(Stage::SwapViews).unwrap();
         twin::swap_views::swap_views(&mut maps);
         compare_finest(backend, &maps)?;
-        // What looks at the images sees them swapped.
+        // Stages on images see the views exchanged.
         backend.run(Stage::Cost).unwrap();
         same(&case.plan, backend, Volume::Cost(0), &twin::cost::cost(&case.plan, &case.pair.mirrored()))?;
-        // Twice is not at all, but for what is not known of the right view.
+        // A second exchange restores everything except the runners-up.
         backend.run(Stage::SwapViews).unwrap();
         twin::swap_views::swap_views(&mut maps);
         compare_finest(backend, &maps)
     });
 }
 
-/// Control: labels that stay where they are, or mirror without a swap, are noticed.
+/// Control: labels that stay, or that are mirrored without an exchange, are detected.
 #[test]
 fn control_a_missing_swap_is_found() {
     let (noticed, all) = (std::cell::Cell::new(0), std::cell::Cell::new(0));

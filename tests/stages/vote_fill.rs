@@ -11,7 +11,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::{Fill, Method, Nearer};
 
-/// Maps after the fill: what is neither valid nor masked is filled.
+/// Maps after the fill: pixels that are neither valid nor masked are filled.
 fn filled(random: &mut Random, plan: &Plan) -> Finest {
     let mut maps = random::finest(random, plan, false);
     for validity in maps.validity.data_mut() {
@@ -31,9 +31,9 @@ fn vote_fill() {
     on_maps(Stage::VoteFill, 20, method, filled, twin::vote_fill::vote_fill);
 }
 
-/// A wrong patch in an even surface is outvoted where its pixels are not confident, but one of another colour is not.
+/// A wrong patch in a flat surface is outvoted if its pixels are not confident, unless it has another colour.
 #[test]
-fn the_doubtful_are_outvoted() {
+fn doubtful_pixels_are_outvoted() {
     let size = (60, 24);
     let inside = |x: usize, y: usize| (24..34).contains(&x) && (8..16).contains(&y);
     let plan = random::plan(size, 0, 20, &Method::default());

@@ -1,19 +1,19 @@
-//! Colours in 8 bits a channel, and their means over blocks of pixels.
+//! 8-bit colours, and their means over blocks of pixels.
 
 use crate::image::{Image, Plane};
 use crate::threads::prelude::*;
 
-/// Channels of a pixel in 8 bits.
+/// The 8-bit channels of a pixel.
 pub(super) fn channels(pixel: [u16; 4]) -> [u8; 3] {
     [0, 1, 2].map(|c| (pixel[c] >> 8) as u8)
 }
 
-/// The sum of the differences of the channels.
+/// The sum of absolute differences of the channels.
 pub(super) fn difference(a: [u8; 3], b: [u8; 3]) -> usize {
     a.into_iter().zip(b).map(|(a, b)| usize::from(a.abs_diff(b))).sum()
 }
 
-/// The mean colours of the unmasked pixels of blocks of `side` x `side`, as far as they are inside; 0 where all are masked.
+/// The mean colours of the unmasked pixels in blocks of `side` x `side` inside the image; 0 if all are masked.
 pub(super) fn mean_colours(image: &Image, side: usize) -> Plane<[u8; 3]> {
     let (width, height) = image.pixels.size();
     let mut means = Plane::filled(width.div_ceil(side), height.div_ceil(side), [0; 3]);

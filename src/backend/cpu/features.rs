@@ -1,4 +1,4 @@
-//! What the costs of the census and of colour are computed from, row by row, and the costs themselves.
+//! Features of census and colour by row, and the costs computed from them.
 
 use super::units::{Blocks, block, block_mut, each_lane};
 use super::windows::{Window, Windows};
@@ -14,17 +14,17 @@ use std::ops::Range;
 const CENSUS_X: usize = CENSUS_RADIUS_X as usize;
 const CENSUS_Y: isize = CENSUS_RADIUS_Y as isize;
 
-/// How far from a label the costs [near](Features::costs_near) it go.
+/// Maximum distance from the label in [`Features::costs_near`].
 pub(super) const FAR: usize = 3;
 
-/// What the costs of all rows are computed from, where they are not stored themselves.
+/// The features of all rows, if costs are not stored.
 #[derive(Default)]
 pub(super) struct Features {
     rows: Vec<RowFeatures>,
 }
 
 impl Features {
-    /// Takes those of a pair.
+    /// Computes the features of a pair.
     pub(super) fn fill(&mut self, plan: &Plan, pair: &Pair) {
         let level = &plan.levels[0];
         let views = Views::new(plan, pair);
@@ -40,12 +40,12 @@ impl Features {
         self.rows[y].costs(plan, out);
     }
 
-    /// Those in `windows`, as a volume holds them.
+    /// The costs of row `y` in `windows`, in the layout of volumes.
     pub(super) fn costs_in_windows(&self, plan: &Plan, windows: &Windows, y: usize, out: &mut [u8]) {
         window_row(plan, &self.rows[y], windows.row(y), out);
     }
 
-    /// Those around the labels of `optima`, a byte each from [`FAR`] labels below on. Those outside the range are undefined.
+    /// A byte each: the costs of row `y` around the labels of `optima`, from [`FAR`] below; undefined outside.
     pub(super) fn costs_near(&self, plan: &Plan, y: usize, optima: &[Optimum], out: &mut [u64]) {
         near_row(plan, &self.rows[y], optima, out);
     }
@@ -91,7 +91,7 @@ fn near_row_on<'a, S: pulp::Simd>(
         let from = label.saturating_sub(FAR).min(last);
         let mut costs = [0; FAR + LABEL_BLOCK + size_of::<u64>()];
         row.costs_of(x, from, &mut costs[FAR..FAR + LABEL_BLOCK]);
-        // A pixel of the right view may have no label.
+        // Pixels of the right view may have no label.
         *out = u64::from_le_bytes(*block(&costs, (label - from).min(LABEL_BLOCK)));
     }
 }
@@ -103,7 +103,7 @@ struct RowCosts<'a> {
 }
 
 impl RowCosts<'_> {
-    /// The costs of the pixel at column `x` at the labels from `from` on; those behind the last label are the largest value.
+    /// The costs of the pixel at column `x` for labels from `from` on; past the last label they are the largest value.
     #[inline(always)]
     fn costs_of(&self, x: usize, from: usize, costs: &mut [u8]) {
         let (level, outside) = (&self.plan.levels[0], self.plan.outside_cost);
@@ -115,7 +115,7 @@ impl RowCosts<'_> {
         // Labels whose pixel is inside the right image.
         let first = (-place).max(0);
         let end = (width as i64 - place).min(level.labels as i64);
-        // From the pixel on, and from that of the first label on.
+        // The values from this pixel on; below, those of the first label's pixel on.
         let here = &left.values[margin + x..];
         if here[Row::MASKED * pitch] != 0 || first >= end {
             costs[..labels].fill(outside);
@@ -134,7 +134,7 @@ impl RowCosts<'_> {
                 *cost = if masked == 0 { *cost } else { outside };
             }
         }
-        // Most pixels need none of these, and an empty fill takes its time too.
+        // Most pixels need none of these, and even an empty fill takes time.
         if first > 0 {
             costs[..first].fill(outside);
         }
@@ -147,9 +147,9 @@ impl RowCosts<'_> {
 
 /// The costs of a left pixel against pixels of the right row.
 struct PixelCosts<'a> {
-    /// The values of the pixel, `pitch` apart.
+    /// The values of the left pixel, `pitch` apart.
     here: &'a [u8],
-    /// From those of the first label's pixel on.
+    /// The values of the right pixels, from the first label's on.
     there: &'a [u8],
     pitch: usize,
     weight: u16,
@@ -190,13 +190,13 @@ impl Blocks for PixelCosts<'_> {
     }
 }
 
-/// The grey of an image, its columns continued beyond the border as far as a census reaches.
+/// The grey of an image, with replicated columns at both borders for the census.
 struct Greys {
     size: (usize, usize),
     mirrored: bool,
-    /// Row by row, with [`CENSUS_X`] more columns on either side.
+    /// Rows with [`CENSUS_X`] extra columns on either side.
     values: Vec<u16>,
-    /// 0, or the largest value where masked; `None` where no pixel is masked.
+    /// 0, or the largest value at masked pixels; `None` if no pixel is masked.
     masked: Option<Vec<u16>>,
 }
 
@@ -223,16 +223,15 @@ impl Greys {
         }
     }
 
-    /// Calls `see` for every offset (dx, dy) of the window around the pixels of row `y`, with the greys at
-    /// that offset for all of them, and which of these are masked. A whole row at a time is processed with
-    /// vectors.
+    /// Calls `see` for every offset (dx, dy) of the window around the pixels of row `y`, with the greys and
+    /// masks at that offset for the whole row, for vectors.
     #[inline(always)]
     fn around(&self, y: usize, mut see: impl FnMut(isize, isize, &[u16], Option<&[u16]>)) {
         let (width, height) = self.size;
         for dy in -CENSUS_Y..=CENSUS_Y {
             let ny = (y as isize + dy).clamp(0, height as isize - 1) as usize;
             for i in 0..=2 * CENSUS_X {
-                // In the order of the original image, mirrored or not.
+                // In the order of the original image, even if mirrored.
                 let column = if self.mirrored { 2 * CENSUS_X - i } else { i };
                 let there = ny * (width + 2 * CENSUS_X) + column..;
                 let masked = self.masked.as_ref().map(|masked| &masked[there.clone()][..width]);
@@ -241,7 +240,7 @@ impl Greys {
         }
     }
 
-    /// The greys of all rows of that window, with the columns beyond the border.
+    /// The greys of all rows of the window, with the extra columns.
     #[inline(always)]
     fn rows_around(&self, y: usize) -> impl Iterator<Item = &[u16]> {
         let (width, height) = self.size;
@@ -252,14 +251,14 @@ impl Greys {
         })
     }
 
-    /// The greys of row `y` itself.
+    /// The greys of row `y`.
     fn row(&self, y: usize) -> &[u16] {
         let (width, _) = self.size;
         &self.values[y * (width + 2 * CENSUS_X) + CENSUS_X..][..width]
     }
 }
 
-/// The grey of both views. The right one is read from right to left, so that ascending labels are side by side.
+/// The grey of both views. The right one is mirrored, so that ascending labels are adjacent.
 pub(super) struct Views<'a> {
     plan: &'a Plan,
     pair: &'a Pair,
@@ -272,7 +271,7 @@ impl<'a> Views<'a> {
     }
 }
 
-/// What the costs of a row are computed from.
+/// The features of a row, from which its costs are computed.
 pub(super) struct RowFeatures {
     left: Row,
     right: Row,
@@ -289,7 +288,7 @@ impl RowFeatures {
         Self { left: row(), right: row(), weights: vec![0; level.width], any_masked: false }
     }
 
-    /// Takes those of row `y`.
+    /// Computes the features of row `y`.
     pub(super) fn fill(&mut self, views: &Views, y: usize, sums: &mut Sums) {
         let [left, right] = &views.greys;
         fill_row(&mut self.left, views.pair.left(), left, y);
@@ -304,12 +303,12 @@ impl RowFeatures {
     }
 }
 
-/// A row of an image as the costs need it, with as many extra pixels at either end as there are labels.
+/// A row of an image in the layout for costs, with a margin of as many pixels as labels at either end.
 struct Row {
     margin: usize,
     pitch: usize,
-    /// \[plane\]\[margin, pixels, margin\]: eight bits of the census per plane, then the channels in 8-bit levels, then 1 where
-    /// masked, else 0.
+    /// \[plane\]\[margin, pixels, margin\]: eight census bits per plane, then the channels in 8-bit levels,
+    /// then 1 for masked pixels, else 0.
     values: Vec<u8>,
 }
 
@@ -331,7 +330,7 @@ impl Row {
     }
 }
 
-/// Fills a row with row `y` of an image.
+/// Computes the features of row `y` of an image.
 #[pulp::with_simd(fill_row = crate::vectors::widest())]
 #[inline(always)]
 fn fill_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut Row, image: &'a Image, greys: &'a Greys, y: usize) {
@@ -349,7 +348,7 @@ fn fill_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut Row, image: &'a Image, grey
             *bits = before | u8::from(grey < centre);
         }
         if let Some(masked) = masked {
-            // A masked pixel is never below the centre.
+            // A masked pixel never counts as below the centre.
             plane.iter_mut().zip(masked).for_each(|(bits, &masked)| *bits &= !(masked as u8 & 1));
         }
     });
@@ -365,11 +364,11 @@ fn fill_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut Row, image: &'a Image, grey
     out.for_each(|(x, out)| *out = u8::from(masked[at(x)]));
 }
 
-/// Sums of grey, and of its square, over the window around each pixel of a row.
+/// Sums of grey and squared grey over the window around each pixel of a row.
 pub(super) struct Sums {
     greys: Vec<u16>,
     squares: Vec<u32>,
-    /// The same over the columns of the windows.
+    /// Sums over the columns of the windows.
     columns: (Vec<u16>, Vec<u32>),
 }
 
@@ -380,7 +379,7 @@ impl Sums {
     }
 }
 
-/// The weight of colour at each pixel of row `y`, from the variance of grey around it.
+/// The weight of colour at each pixel of row `y`, by the variance of grey around it.
 #[pulp::with_simd(colour_weights = crate::vectors::widest())]
 #[inline(always)]
 fn colour_weights_on<'a, S: pulp::Simd>(
@@ -417,14 +416,14 @@ fn colour_weights_on<'a, S: pulp::Simd>(
             squares.iter_mut().zip(&column_squares[i..]).for_each(|(square, column)| *square += column);
         }
     }
-    // The centre stands for masked pixels, so that no column is the same in two windows.
+    // The centre replaces masked pixels, so columns cannot be shared between windows.
     greys.around(y, |_, _, others, masked| {
         let Some(masked) = masked else { return };
         for (i, (sum, square)) in sums.iter_mut().zip(squares.iter_mut()).enumerate() {
             add(sum, square, others[i] & !masked[i] | centre[i] & masked[i]);
         }
     });
-    // n / most for n below 2^32, as the upper half of a product (Lemire, Kaser and Kurz 2019): a division takes ten times as long.
+    // n / most for n below 2^32, as the upper half of a product (Lemire, Kaser and Kurz 2019); a division takes ten times as long.
     let reciprocal = (1 << 64) / u128::from(most) + 1;
     let divided = |n: u32| ((reciprocal * u128::from(n)) >> 64) as u16;
     for (weight, (sum, square)) in weights.iter_mut().zip(sums.iter().zip(squares.iter())) {

@@ -1,36 +1,36 @@
-//! Planes through the disparities of windows, by least squares: see [`crate::backend::Stage::Plane`].
+//! Least-squares planes through the disparities of windows: see [`crate::backend::Stage::Plane`].
 //!
-//! Neighbouring pixels of a row are the lanes of vectors, as in the median, which loads the values. What is summed along a row or a
-//! column of the window fits in 16 bits.
+//! The lanes of vectors are neighbouring pixels of a row, as in the median, which loads the values. Sums
+//! along a row or column of the window fit in 16 bits.
 
 use super::places::{LANES, Values, Weighed};
 use super::units::each_lane;
 use crate::plan::planes::{PLANE_BITS, PLANE_FARTHEST, PLANE_STEEPEST};
 
-/// The largest side of a window.
+/// Largest side of a window.
 const MOST: usize = 31;
 
-/// A number for each lane.
+/// One number per lane.
 type Lanes<T> = [T; LANES];
 
-/// Planes through the disparities around [`LANES`] adjacent pixels, and what they are found by. (It stays in memory, from where compilers make
-/// vectors of what they would otherwise spread over registers, number by number.)
+/// Planes through the disparities around [`LANES`] adjacent pixels, and their sums. (The struct stays in
+/// memory, because from there compilers vectorize what they would otherwise spread over scalar registers.)
 #[derive(Default)]
 pub(super) struct Planes {
-    /// Where they pass at the pixels, above the medians.
+    /// Values of the planes at the pixels, relative to the medians.
     value: Lanes<i32>,
-    /// In x and y.
+    /// Slopes along x and y.
     slopes: [Lanes<i32>; 2],
     rows: [Line; MOST],
     columns: [Line; MOST],
     sums: Sums,
 }
 
-/// The sums over a row or a column of the windows. All of them fit in 16 bits: m is at most 127 and |g| at most 1016.
+/// Sums over a row or a column of the windows. All fit in 16 bits: m is at most 127 and |g| at most 1016.
 #[derive(Clone, Copy, Default)]
 struct Line {
     m: Lanes<i16>,
-    /// Of m x; of rows alone.
+    /// Sum of m x; only for rows.
     mx: Lanes<i16>,
     g: Lanes<i16>,
 }
@@ -50,7 +50,7 @@ struct Sums {
 }
 
 impl Planes {
-    /// How far above the medians the planes through these places pass, in windows of this radius.
+    /// The values of the planes relative to the medians, for windows of this radius.
     #[inline(always)]
     pub(super) fn above_medians(
         &mut self,
@@ -68,7 +68,7 @@ impl Planes {
         &self.value
     }
 
-    /// Sums over the rows and columns, where disparities count up to 256 of 2 to `bits` 1/256 px.
+    /// Sums over rows and columns; disparities count up to 2^(8 + `bits`) / 256 px from the plane.
     #[inline(always)]
     fn sum_lines(
         &mut self,
@@ -106,7 +106,7 @@ impl Planes {
     fn sum_all(&mut self, radius: usize) {
         let Self { rows, columns, sums, .. } = self;
         *sums = Sums::default();
-        // There is a row in every second place, with one in the centre.
+        // Every second row has places, including the one of the centre.
         let skipped = radius % 2;
         let from = radius as i16;
         for (row, y) in rows[skipped..=2 * radius].iter().step_by(2).zip((skipped as i16 - from..).step_by(2))
@@ -127,8 +127,8 @@ impl Planes {
         }
     }
 
-    /// Goes to the least squares of the sums, in units of 2 to `bits`. Every number here fits in 32 bits: in windows of up to 31 x 31, xx
-    /// and yy are up to 3,650, and |xe| and |ye| up to 3,845.
+    /// Updates the planes by least squares from the sums, in units of 2^`bits`. All numbers fit in 32 bits:
+    /// in windows of up to 31 x 31, xx and yy are at most 3,650, and |xe| and |ye| at most 3,845.
     #[inline(always)]
     fn follow(&mut self, bits: u32) {
         let Self { value, slopes: [slope_x, slope_y], sums, .. } = self;
@@ -156,14 +156,14 @@ impl Planes {
     }
 }
 
-/// A positive number to divide by, in floats: vectors divide nothing else.
+/// A positive divisor as a float, since vectors have no integer division.
 #[derive(Clone, Copy)]
 struct Divisor(f64);
 
 impl Divisor {
     #[inline(always)]
     fn new(divisor: i32) -> Self {
-        // So much above 1 that no whole quotient comes out below itself, and too little for others to reach the next whole number.
+        // So far above 1 that no exact quotient is rounded below itself, and so near that no other becomes exact.
         const ONE: f64 = 1.0 + 4.0 * f64::EPSILON;
         Self(ONE / f64::from(divisor))
     }
@@ -171,7 +171,7 @@ impl Divisor {
     /// The quotient, rounded towards 0.
     #[inline(always)]
     fn divide(self, number: i32) -> i32 {
-        // Whole numbers become the lower bits of such a sum.
+        // Adding this puts an integer into the lower bits of the sum.
         const WHOLE: f64 = 1.5 * (1u64 << 52) as f64;
         ((f64::from(number) * self.0).trunc() + WHOLE).to_bits() as i32
     }
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quotients_are_those_of_integers() {
+    fn quotients_equal_integer_division() {
         let few =
             [1, 2, 3, 5, 7, 10, 127, 641, 59_055, 65_536, 6_700_417, 13_322_500, i32::MAX - 1, i32::MAX];
         let many = (1..3000).map(|i| 1 + i * i * 37).chain(few);

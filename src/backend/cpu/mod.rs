@@ -22,7 +22,7 @@ use crate::maps::Maps;
 use crate::memory;
 use crate::pause::Pause;
 use crate::plan::{Plan, VolumeWidth};
-use crate::program::{Part, Program, Run, sharing, together};
+use crate::program::{Program, RowBand, Run, sharing, together};
 use crate::stage::{Data, MapSet};
 use crate::threads::prelude::current_num_threads;
 use std::future::ready;
@@ -39,13 +39,13 @@ pub struct Cpu {
     pause: Pause,
 }
 
-/// Volumes in the width that the plan asks for.
+/// Volumes in the width of the plan.
 enum State {
     Narrow(Volumes<u8>),
     Wide(Volumes<u16>),
 }
 
-/// Runs an expression on the volumes, whatever their width.
+/// Runs an expression on the volumes of either width.
 macro_rules! on_volumes {
     ($self:ident, $volumes:ident => $body:expr) => {
         match $self.state.as_mut().expect("prepare comes before every stage") {
@@ -58,7 +58,7 @@ macro_rules! on_volumes {
 use on_volumes;
 
 impl Cpu {
-    /// The CPU path on the maps of a match of `pair`, for the stages that look at maps alone.
+    /// The CPU path on the maps of a match of `pair`, for map stages only.
     pub(crate) fn of_maps(plan: &Plan, pair: Pair, maps: MapSet) -> Self {
         Self { state: Some(State::Narrow(Volumes::of_maps(plan, pair, maps))), ..Self::default() }
     }
@@ -81,7 +81,7 @@ impl Backend for Cpu {
             Some(State::Narrow(volumes)) if plan.fits(&volumes.plan) => volumes.reset(plan, prepared),
             Some(State::Wide(volumes)) if plan.fits(&volumes.plan) => volumes.reset(plan, prepared),
             _ => {
-                // The volumes of the last match are freed before new ones are allocated.
+                // Free the volumes of the last match before new ones are allocated.
                 self.state = None;
                 memory::check(plan.bytes(), Purpose::Match)?;
                 self.state = Some(match plan.volume_width {
@@ -110,14 +110,14 @@ impl Backend for Cpu {
     fn perform(&mut self, run: &Run) -> Result<()> {
         for stage in run.stages() {
             let start = Instant::now();
-            on_volumes!(self, v => match &run.part {
+            on_volumes!(self, v => match &run.band {
                 None => v.run(stage),
-                Some(Part { rows, sent }) => {
+                Some(RowBand { rows, sent }) => {
                     v.begin(stage);
                     v.run_rows(stage, *sent, rows.clone());
                 }
             });
-            let begins = run.part.as_ref().is_none_or(|part| part.rows.start == 0);
+            let begins = run.band.as_ref().is_none_or(|band| band.rows.start == 0);
             let Some(times) = &mut self.times else { continue };
             match times.iter_mut().rev().find(|time| time.0 == stage && !begins) {
                 Some(time) => time.1 += start.elapsed(),

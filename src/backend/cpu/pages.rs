@@ -6,10 +6,10 @@ use memmap2::MmapMut;
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 
-/// Values that are 0 at first, in large pages where the system has them. Small pages are allocated one by one
-/// at their first access, and that takes longer than a match.
+/// Values initialized to 0, in huge pages if the system has them. Faulting in small pages one by one takes
+/// longer than a match.
 pub(super) struct Pages<T> {
-    /// `None` where there are no values.
+    /// `None` if there are no values.
     bytes: Option<MmapMut>,
     values: PhantomData<T>,
 }
@@ -18,7 +18,7 @@ impl<T: Pod> Pages<T> {
     /// `len` values.
     ///
     /// # Errors
-    /// [`MemoryError::Machine`] when the system does not have as much memory.
+    /// [`MemoryError::Machine`] when the system has too little memory.
     pub(super) fn new(len: usize) -> Result<Self, MemoryError> {
         let size = len * size_of::<T>();
         if size == 0 {
@@ -29,13 +29,13 @@ impl<T: Pod> Pages<T> {
             available: None,
             purpose: Purpose::Match,
         })?;
-        // Only a hint: a system without large pages gives small ones.
+        // Only a hint: systems without huge pages use small ones.
         #[cfg(target_os = "linux")]
         let _ = bytes.advise(memmap2::Advice::HugePage);
         Ok(Self { bytes: Some(bytes), values: PhantomData })
     }
 
-    /// The same memory for values of another type, which are undefined.
+    /// The same memory for values of another type; they are undefined.
     pub(super) fn of_others<V: Pod>(self) -> Pages<V> {
         Pages { bytes: self.bytes, values: PhantomData }
     }

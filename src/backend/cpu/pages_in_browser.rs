@@ -1,13 +1,13 @@
-//! Memory for volumes in a browser, which has pages of one size.
+//! Memory for volumes in browsers, which have one page size.
 
 use crate::error::{MemoryError, Purpose, Result};
 use bytemuck::Pod;
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 
-/// Values that are 0 at first.
+/// Values initialized to 0.
 pub(super) struct Pages<T> {
-    /// Aligned for every type of value.
+    /// Words, so that values of every type are aligned.
     words: Vec<u64>,
     values: PhantomData<T>,
 }
@@ -16,7 +16,7 @@ impl<T: Pod> Pages<T> {
     /// `len` values.
     ///
     /// # Errors
-    /// [`MemoryError::Machine`] when there is not as much memory.
+    /// [`MemoryError::Machine`] when there is too little memory.
     pub(super) fn new(len: usize) -> Result<Self, MemoryError> {
         let needed = len as u64 * size_of::<T>() as u64;
         let lacking = |_| MemoryError::Machine { needed, available: None, purpose: Purpose::Match };
@@ -27,7 +27,7 @@ impl<T: Pod> Pages<T> {
         Ok(Self { words, values: PhantomData })
     }
 
-    /// The same memory for values of another type, which are undefined.
+    /// The same memory for values of another type; they are undefined.
     pub(super) fn of_others<V: Pod>(self) -> Pages<V> {
         Pages { words: self.words, values: PhantomData }
     }

@@ -1,10 +1,10 @@
-//! What the places of the windows of adjacent pixels hold, for median and planes.
+//! Places in the windows of adjacent pixels, for median and planes.
 
-/// Number of pixels whose windows are weighed together, in vectors of bytes.
+/// Number of adjacent pixels that are processed together, in vectors of bytes.
 pub(super) const LANES: usize = 32;
 
-/// Where a place of the first lane's window lies in the input, how many steps in x and y from the centre, and the weights of all
-/// lanes: 0 without disparity.
+/// A place of the windows: its index in the input for the first lane, its steps from the centre in x and y,
+/// and its weights for all lanes, which are 0 without a disparity.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Weighed {
     pub(super) at: usize,
@@ -12,7 +12,7 @@ pub(super) struct Weighed {
     pub(super) weights: [u8; LANES],
 }
 
-/// The disparities at a place of the window, for all lanes, relative to a base of each lane.
+/// The disparities at a place of the windows, for all lanes, relative to a base per lane.
 #[repr(align(64))]
 #[derive(Clone, Copy, Default)]
 pub(super) struct Values(pub(super) [i16; LANES]);

@@ -16,18 +16,18 @@ use std::hint::black_box;
 use std::mem;
 use web_time::Instant;
 
-/// Bytes that [`Cpu::copy_rate`] copies, and its number of tries.
+/// Bytes that [`Cpu::copy_rate`] copies, and number of tries.
 const COPIED_BYTES: usize = 1 << 28;
 const COPY_TRIES: usize = 8;
 
 impl Cpu {
-    /// The rate at which the threads of the current pool copy between two buffers larger than caches: bytes
-    /// read and written per second, the best of a few tries.
+    /// The rate at which the threads of the current pool copy between buffers larger than caches: bytes read
+    /// and written per second, the best of a few tries.
     #[must_use]
     pub fn copy_rate() -> f64 {
         let from = vec![1u8; COPIED_BYTES];
         let mut to = vec![0u8; COPIED_BYTES];
-        // One piece per thread: copies of long runs bypass the caches.
+        // One piece per thread, because long copies bypass the caches.
         let piece = COPIED_BYTES.div_ceil(current_num_threads());
         let mut rate = || {
             let start = Instant::now();
@@ -107,8 +107,7 @@ impl<U: Units> Volumes<U> {
         }
     }
 
-    /// Makes the messages between level `z` and the next finer one count as stored: where none have been sent
-    /// yet, they become 0.
+    /// Marks the messages between level `z` and the next finer one as sent; unsent ones become 0.
     fn store_resolution(&mut self, z: usize) {
         if !mem::replace(&mut self.levels[z].resolution_sent, true) {
             self.levels[z].up.fill(U::default());
@@ -186,7 +185,7 @@ impl<U: Units> Volumes<U> {
     }
 }
 
-/// Calls `with` for every slot of every pixel, with the pixel's window and where the cells of the slot start.
+/// Calls `with` for every slot of every pixel, with the pixel's window and the slot's first index.
 fn each_row(level: &LevelPlan, windows: &Windows, slots: usize, mut with: impl FnMut(Window, usize)) {
     for (x, y) in (0..level.height).flat_map(|y| (0..level.width).map(move |x| (x, y))) {
         let window = windows.row(y)[x];
@@ -195,7 +194,7 @@ fn each_row(level: &LevelPlan, windows: &Windows, slots: usize, mut with: impl F
     }
 }
 
-/// Writes the rows `values` of a level, `slots` a pixel, to a volume, and `padding` after them.
+/// Writes the rows `values` of a level, `slots` per pixel, to a volume, followed by `padding`.
 fn scatter<T: Copy>(
     level: &LevelPlan,
     windows: &Windows,

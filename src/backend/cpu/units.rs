@@ -3,7 +3,7 @@
 use crate::plan::{LABEL_BLOCK, Truncation, TruncationRule};
 use std::ops::{BitAnd, BitOr, Not};
 
-/// A cost in units, as a volume stores it. Sums saturate, and differences stop at 0.
+/// A stored cost in units. Sums saturate, and differences are at least 0.
 pub(super) trait Units:
     bytemuck::Pod
     + Default
@@ -17,10 +17,10 @@ pub(super) trait Units:
     + BitAnd<Output = Self>
     + Not<Output = Self>
 {
-    /// The largest value, which stands for infinity.
+    /// The largest value, used as infinity.
     const MOST: Self;
 
-    /// A block of the largest value, one of 0, and one of the largest again.
+    /// A block of the largest value, a block of 0, and a block of the largest value.
     const EDGE: &'static [Self; 3 * LABEL_BLOCK];
 
     /// The saturating sum.
@@ -32,8 +32,7 @@ pub(super) trait Units:
     /// A value, clamped to the largest.
     fn of(value: u32) -> Self;
 
-    /// The values at even and at odd indices. (Written with words of two values, a form that compilers turn
-    /// into shuffles.)
+    /// The values at even and odd indices. (Written with words of two values, which compile to shuffles.)
     fn deinterleave(values: &[Self; 2 * LABEL_BLOCK]) -> [[Self; LABEL_BLOCK]; 2];
 
     /// `even` and `odd`, alternating.
@@ -120,8 +119,8 @@ pub(super) fn block_mut<T, const N: usize>(row: &mut [T], at: usize) -> &mut [T;
     row[at..].first_chunk_mut().expect("rows are whole blocks")
 }
 
-/// The values of `lane` at 0 .. `N`. Unlike `std::array::from_fn`, it is always inlined: where a compiler left
-/// the calls inside `from_fn` standing, nothing became a vector, and a stage took three times as long.
+/// The values of `lane` at 0 .. `N`. Unlike `std::array::from_fn`, it is always inlined; where calls inside
+/// `from_fn` remained, nothing was vectorized and a stage took three times as long.
 #[inline(always)]
 pub(super) fn each_lane<T: Copy + Default, const N: usize>(mut lane: impl FnMut(usize) -> T) -> [T; N] {
     let mut lanes = [T::default(); N];
@@ -131,22 +130,22 @@ pub(super) fn each_lane<T: Copy + Default, const N: usize>(mut lane: impl FnMut(
     lanes
 }
 
-/// The smallest values in each of `LABEL_BLOCK` lanes.
+/// The minimum in each of `LABEL_BLOCK` lanes.
 pub(super) type Least<U> = [U; LABEL_BLOCK];
 
-/// The smallest of all lanes, in each of them.
+/// The minimum of all lanes, in each lane.
 #[inline(always)]
 fn least_in_all<U: Units>(lanes: Least<U>) -> Least<U> {
     least_of_pairs::<U, 1>(least_of_pairs::<U, 2>(least_of_pairs::<U, 4>(least_of_pairs::<U, 8>(lanes))))
 }
 
-/// The smaller of each lane and the one `APART` from it. (A constant, so that it becomes a shuffle.)
+/// The minimum of each lane and the lane `APART` from it. (A constant, so that it becomes a shuffle.)
 #[inline(always)]
 fn least_of_pairs<U: Units, const APART: usize>(lanes: Least<U>) -> Least<U> {
     each_lane(|i| lanes[i].min(lanes[i ^ APART]))
 }
 
-/// The smaller, lane by lane, of `least` and all of `values`.
+/// Lowers each lane of `least` to the minimum of all `values` in that lane.
 #[inline(always)]
 pub(super) fn keep_least<U: Units, const N: usize>(least: &mut Least<U>, values: &[U; N]) {
     for values in values.as_chunks().0 {
@@ -157,7 +156,7 @@ pub(super) fn keep_least<U: Units, const N: usize>(least: &mut Least<U>, values:
 
 /// An operation on rows of labels, block by block.
 pub(super) trait Blocks {
-    /// Whether four vectors of each row fit in the registers.
+    /// Whether the registers hold four vectors of each row.
     const LONG: bool = false;
 
     /// Processes `N` labels from `at` on.
@@ -181,7 +180,7 @@ pub(super) trait Blocks {
     }
 }
 
-/// Truncates sums to a message, with [`Truncation::bounds`] for the smallest of `least`.
+/// Truncates sums to a message, with [`Truncation::bounds`] for the minimum of `least`.
 #[inline(always)]
 pub(super) fn truncate<U: Units>(sums: &[U], least: Least<U>, cut: Truncation, out: &mut [U]) {
     let (low, high) = bounds(least, cut);
@@ -190,8 +189,8 @@ pub(super) fn truncate<U: Units>(sums: &[U], least: Least<U>, cut: Truncation, o
     }
 }
 
-/// [`Truncation::bounds`], (low, high), in every lane. This keeps the bounds of a message in vectors. When they passed through
-/// single values, a factor waited longer than it computed.
+/// [`Truncation::bounds`], (low, high), in every lane. The bounds stay in vectors: passing them through
+/// scalars made a factor wait longer than it computed.
 #[inline(always)]
 pub(super) fn bounds<U: Units>(least: Least<U>, cut: Truncation) -> (Least<U>, Least<U>) {
     let tau = U::of(cut.tau.into());
@@ -210,7 +209,7 @@ pub(super) fn cut_block<U: Units>(sums: &Least<U>, low: &Least<U>, high: &Least<
     each_lane(|i| sums[i].min(high[i]).less(low[i]))
 }
 
-/// Index and value of the smallest value of whole blocks, the lowest index on ties.
+/// Index and value of the minimum of whole blocks, the lowest index on ties.
 #[inline(always)]
 pub(super) fn argmin<U: Units>(row: &[U]) -> (usize, U) {
     let mut least = [u32::MAX; LABEL_BLOCK];

@@ -18,14 +18,14 @@ use std::mem;
 pub(super) struct Volumes<U> {
     pub(super) plan: Plan,
     pub(super) pair: Pair,
-    /// What the matching cost compares, where the costs of level 0 are not stored.
+    /// Features for the matching cost, if the costs of level 0 are not stored.
     pub(super) features: Features,
-    /// Cost of level 0, where it is stored; the costs of coarser levels are in `levels`.
+    /// Cost of level 0, if stored; the costs of coarser levels are in `levels`.
     pub(super) fine_cost: Pages<u8>,
     pub(super) levels: Vec<Level<U>>,
-    /// First and last label of each pixel, by level; empty where all labels are allowed.
+    /// First and last label of each pixel, by level; empty if all labels are allowed.
     pub(super) label_ranges: Vec<Plane<[u16; 2]>>,
-    /// Label map of the last [`Stage::Change`](crate::backend::Stage::Change), the sum of squared
+    /// The label map of the last [`Stage::Change`](crate::backend::Stage::Change), then the sum of squared
     /// changes, and whether the map has settled.
     pub(super) labels: Vec<u16>,
     pub(super) change: Option<u64>,
@@ -33,23 +33,22 @@ pub(super) struct Volumes<U> {
     pub(super) maps: MapSet,
 }
 
-/// Volumes of one level. Cost is \[y\]\[x\]\[label\] with padded labels; the others hold the labels of the `windows` alone,
-/// within memory for all of them, which the system gives where it is used. At level 0 they hold
+/// Volumes of one level. Cost is \[y\]\[x\]\[label\] with padded labels; the others hold only the labels of
+/// the `windows`, in memory reserved for all labels, which the system commits on use. At level 0 they hold
 /// [`Plan::rows_held`] rows.
 pub(super) struct Level<U> {
     pub(super) graph: LevelGraph,
-    /// What the graph was chosen by; `None` at level 0, whose guide is the left image.
+    /// The image that the graph was chosen by; `None` at level 0, whose guide is the left image.
     pub(super) guide: Option<Image>,
     pub(super) windows: Windows,
-    /// In 1/256 cost units; empty at level 0, and where it [shares](Plan::shares) the memory of the messages once these are sent.
+    /// In 1/256 cost units; empty at level 0, and once messages are sent in memory that it [shares](Plan::shares).
     pub(super) cost: Pages<u16>,
     pub(super) evidence: Pages<u8>,
     pub(super) dependency: Pages<U>,
-    /// Whether the dependency factors have sent their messages. Until then all count as 0, whatever is
-    /// stored.
+    /// Whether the dependency factors have sent messages. Until then all count as 0, whatever is stored.
     pub(super) dependency_sent: bool,
-    /// The same for the resolution factors between this level and the next finer one: `up` of this level and
-    /// `down` of the finer one.
+    /// Whether the resolution factors between this level and the next finer one have sent messages: `up` of
+    /// this level and `down` of the finer one.
     pub(super) resolution_sent: bool,
     /// Empty at the coarsest level.
     pub(super) down: Pages<U>,
@@ -70,7 +69,7 @@ impl<U: Units> Volumes<U> {
                 let held = plan.rows_held(z);
                 let cells = Windows::most_cells(level, held);
                 let cost = if z == 0 { 0 } else { level.pixels() * level.stride };
-                // Costs lie where the messages will.
+                // Costs are in the memory of the messages until these are sent.
                 let shared = if plan.shares { (2 * cost).div_ceil(size_of::<U>()) } else { 0 };
                 Ok(Level {
                     windows: Windows::full(level, held),
@@ -94,7 +93,7 @@ impl<U: Units> Volumes<U> {
         Ok(Self { fine_cost, levels, label_ranges, labels: vec![0; fine.pixels()], ..of_maps })
     }
 
-    /// Maps, and no volumes.
+    /// Maps without volumes.
     pub(super) fn of_maps(plan: &Plan, pair: Pair, maps: MapSet) -> Self {
         Self {
             plan: plan.clone(),
@@ -110,7 +109,7 @@ impl<U: Units> Volumes<U> {
         }
     }
 
-    /// Frees the graphs with their guides, and the label ranges.
+    /// Frees graphs, guides and label ranges.
     pub(super) fn release(&mut self) {
         self.label_ranges = Vec::new();
         for level in &mut self.levels {
@@ -118,7 +117,7 @@ impl<U: Units> Volumes<U> {
         }
     }
 
-    /// Gives what `stage` writes its memory, where that held something else so far.
+    /// Moves shared memory to the volume that `stage` writes.
     pub(super) fn make_room(&mut self, stage: Stage) {
         for volume in stage.writes().filter_map(Data::volume).filter(|_| self.plan.shares) {
             let Level { cost, dependency, .. } = &mut self.levels[volume.level()];
@@ -130,7 +129,7 @@ impl<U: Units> Volumes<U> {
         }
     }
 
-    /// Starts a stage: which messages there are by now, and that it sends its own.
+    /// Starts a stage: returns the messages sent so far, and marks its own as sent.
     pub(super) fn begin(&mut self, stage: Stage) -> Sent {
         let z = stage.level().unwrap_or(0);
         let sent = Sent {
@@ -148,7 +147,7 @@ impl<U: Units> Volumes<U> {
         sent
     }
 
-    /// Resets everything for another pair whose plan fits, to the state that [`Self::new`] gives.
+    /// Resets everything to the state after [`Self::new`], for another pair whose plan fits.
     pub(super) fn reset(&mut self, plan: &Plan, prepared: Prepared) {
         let Prepared { pair, label_ranges, .. } = prepared;
         self.plan = plan.clone();

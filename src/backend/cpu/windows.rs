@@ -1,11 +1,11 @@
-//! Label windows of a level, and where the volumes hold the cells of each pixel.
+//! Label windows of a level, and the layout of the pixels' cells in volumes.
 //!
-//! A volume is \[y\]\[x\]\[slot\]\[label of the pixel's window\] (slot only for dependency messages). Windows differ from run to
-//! run, so rows of a volume differ in length. A row has a block of unused cells on either side, so that a block of labels
-//! can be loaded wherever it touches a window.
+//! A volume is \[y\]\[x\]\[slot\]\[label of the pixel's window\] (slot only for dependency messages). Windows
+//! differ, so rows of a volume differ in length. A row has a block of unused cells on either side, so that a
+//! block of labels can be loaded wherever it overlaps a window.
 //!
-//! Where not all rows are held at the same time, a volume is a ring: a row takes the place of one that is no longer needed.
-//! The two rows that share windows stay side by side.
+//! If only some rows are held, a volume is a ring: rows replace rows that are no longer needed. The two rows
+//! that share windows stay adjacent.
 
 use super::units::{Units, each_lane};
 use crate::image::Plane;
@@ -13,7 +13,7 @@ use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, LevelPlan, WINDOW_RUN};
 use std::array::from_fn;
 use std::ops::Range;
 
-/// The label window of a pixel, and where its cells start in their row.
+/// The label window of a pixel, and the index of its cells in their row.
 #[derive(Clone, Copy)]
 pub(super) struct Window {
     start: u32,
@@ -22,7 +22,7 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Where the pixel's cells start in their row.
+    /// Index of the pixel's first cell in its row.
     #[inline(always)]
     pub(super) fn start(self) -> usize {
         self.start as usize
@@ -40,13 +40,13 @@ impl Window {
         self.stride.into()
     }
 
-    /// Whether both hold the same labels.
+    /// Whether both contain the same labels.
     #[inline(always)]
     pub(super) fn matches(self, other: Self) -> bool {
         (self.first, self.stride) == (other.first, other.stride)
     }
 
-    /// The cells in their row.
+    /// The indices of the cells in their row.
     #[inline(always)]
     pub(super) fn cells(self) -> Range<usize> {
         self.start()..self.start() + self.stride()
@@ -60,14 +60,14 @@ pub(super) struct Windows {
     labels: usize,
     /// \[row of windows\]\[x\].
     all: Vec<Window>,
-    /// Where each row of cells starts.
+    /// Index of the first cell of each row.
     rows: Vec<usize>,
     /// Cells of a row, by row of windows.
     lengths: Vec<usize>,
 }
 
 impl Windows {
-    /// Windows that hold all labels, of which `held` rows are needed at the same time.
+    /// Windows with all labels; `held` rows are needed at the same time.
     pub(super) fn full(level: &LevelPlan, held: usize) -> Self {
         let (runs, rows) = level.windows();
         Self::new(level, held, &Plane::filled(runs, rows, [0, level.stride as u16]))
@@ -90,7 +90,7 @@ impl Windows {
         Self { width, labels: level.labels, all, rows, lengths }
     }
 
-    /// Largest number of cells of a volume of `level`, of which `held` rows are needed at the same time.
+    /// Upper bound of the cells of a volume of `level`, if `held` rows are needed at the same time.
     pub(super) fn most_cells(level: &LevelPlan, held: usize) -> usize {
         let rows = level.height.min(if held < level.height { 2 * (pairs(held) + 1) } else { held });
         rows * (level.width * level.stride + 2 * LABEL_BLOCK)
@@ -107,12 +107,12 @@ impl Windows {
         &self.all[y / 2 * self.width..][..self.width]
     }
 
-    /// The windows of the rows around row `y` that its factors reach; those outside the image are empty.
+    /// The windows of the rows around row `y` that its factors reach; empty outside the image.
     pub(super) fn around(&self, y: usize) -> [&[Window]; GRAPH_WINDOW] {
         from_fn(|k| self.row_around(y, k).map_or(&[][..], |ny| self.row(ny)))
     }
 
-    /// Where the cells of these rows start, counted from the cell `first`; 0 for those before it and outside the image.
+    /// Indices of the first cells of these rows relative to the cell `first`; 0 before it and outside the image.
     pub(super) fn starts_around(&self, y: usize, first: usize) -> [usize; GRAPH_WINDOW] {
         from_fn(|k| self.row_around(y, k).map_or(0, |ny| self.rows[ny].saturating_sub(first)))
     }
@@ -133,7 +133,7 @@ impl Windows {
         window.first()..window.first() + self.labels(window)
     }
 
-    /// Where the cells of row `y` start.
+    /// Index of the first cell of row `y`.
     #[inline(always)]
     pub(super) fn start(&self, y: usize) -> usize {
         self.rows[y]
@@ -156,7 +156,7 @@ impl Windows {
         &volume[self.rows[y]..][..self.lengths[y / 2]]
     }
 
-    /// These rows of a volume with `slots` times as many cells, `each` of them together: one, or two that share windows.
+    /// `rows` of a volume with `slots` times as many cells, in groups of `each` rows: one, or two that share windows.
     pub(super) fn rows_mut<'a, T>(
         &self,
         volume: &'a mut [T],
@@ -165,7 +165,7 @@ impl Windows {
         rows: Range<usize>,
     ) -> Vec<&'a mut [T]> {
         let Some(&first) = self.rows.get(rows.start) else { return Vec::new() };
-        // In a ring the later rows may be before the earlier ones.
+        // In a ring, later rows may be stored before earlier ones.
         let (before, after) = volume.split_at_mut(slots * first);
         let mut parts = [(after, slots * first), (before, 0)].into_iter();
         let (mut rest, mut at) = parts.next().expect("two parts");
@@ -194,17 +194,17 @@ impl Windows {
     }
 }
 
-/// Pairs of rows, each from an even row on, that `held` rows touch at most.
+/// Largest number of pairs of rows (starting at even rows) that `held` rows touch.
 fn pairs(held: usize) -> usize {
     held / 2 + 1
 }
 
-/// Where each row starts in a volume of which `held` rows are needed at the same time; `lengths` of the rows, by pair.
+/// Start of each row in a volume of which `held` rows are needed at the same time; `lengths` are per pair of rows.
 fn places(lengths: &[usize], held: usize, height: usize) -> Vec<usize> {
     let doubled: Vec<usize> = lengths.iter().map(|length| 2 * length).collect();
     let size = if held < height {
         let most = doubled.windows(pairs(held).min(doubled.len())).map(|pairs| pairs.iter().sum()).max();
-        // What is left at the end of the ring is less than a pair.
+        // The unused end of the ring is smaller than a pair.
         most.unwrap_or(0) + doubled.iter().max().unwrap_or(&0)
     } else {
         usize::MAX
@@ -220,20 +220,19 @@ fn places(lengths: &[usize], held: usize, height: usize) -> Vec<usize> {
     rows
 }
 
-/// The cells of a pixel as seen through the window of another.
+/// The cells of a pixel, aligned to the window of another pixel.
 #[derive(Clone, Copy)]
-pub(super) struct Seen<'a, U> {
+pub(super) struct AlignedCells<'a, U> {
     cells: &'a [U],
     start: usize,
-    /// First label of the other window less that of the pixel's own.
+    /// First label of the other window minus first label of the pixel's own.
     shift: isize,
     stride: isize,
     labels: isize,
 }
 
-impl<'a, U: Units> Seen<'a, U> {
-    /// The cells that start at `start` in `cells` and belong to a pixel with this `window`, of `windows`, for labels counted
-    /// from `first`.
+impl<'a, U: Units> AlignedCells<'a, U> {
+    /// The cells from `start` on in `cells`, of a pixel with this `window`; labels count from `first`.
     #[inline(always)]
     pub(super) fn new(windows: &Windows, window: Window, cells: &'a [U], start: usize, first: usize) -> Self {
         let (shift, stride) =
@@ -241,8 +240,8 @@ impl<'a, U: Units> Seen<'a, U> {
         Self { cells, start, shift, stride, labels: windows.labels(window).cast_signed() }
     }
 
-    /// The block of labels at `at`: the cells, and the largest value for those that are not labels of the pixel, 0 for the
-    /// others.
+    /// The block of labels at `at`: its cells, and a mask with the largest value for labels that the pixel
+    /// does not have, and 0 for others.
     #[inline(always)]
     pub(super) fn block(&self, at: usize) -> (&'a [U; LABEL_BLOCK], [U; LABEL_BLOCK]) {
         let block = LABEL_BLOCK.cast_signed();
@@ -256,8 +255,8 @@ impl<'a, U: Units> Seen<'a, U> {
         (cells, each_lane(|i| before[i] | after[i]))
     }
 
-    /// The block of labels at `at` where both windows hold the same labels. Padding is stored with the largest belief, which is
-    /// above all others less a message.
+    /// The block of labels at `at` if both windows contain the same labels. Padding has the largest belief,
+    /// which exceeds all others even minus a message.
     #[inline(always)]
     pub(super) fn same_block(&self, at: usize) -> (&'a [U; LABEL_BLOCK], [U; LABEL_BLOCK]) {
         let cells = self.cells[self.start + at..].first_chunk().expect("rows are whole blocks");
@@ -269,7 +268,7 @@ impl<'a, U: Units> Seen<'a, U> {
 mod tests {
     use super::*;
 
-    /// Whether any two of `held` rows in a row share cells, with the places that rows have.
+    /// Whether any two of `held` consecutive rows at these places share cells.
     fn collide(places: &[usize], lengths: &[usize], held: usize) -> bool {
         let cells = |y: usize| places[y]..places[y] + lengths[y / 2];
         (0..places.len()).any(|y| {

@@ -5,11 +5,11 @@ use crate::process;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-/// An adapter, as `mrfgs devices` lists it.
+/// An adapter as listed by `mrfgs devices`.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct DeviceInfo {
-    /// Position in the list, which `--device` accepts besides a part of the name.
+    /// Position in the list, which `--device` accepts like a part of the name.
     pub index: usize,
     /// Name given by its driver.
     pub name: String,
@@ -21,19 +21,18 @@ pub struct DeviceInfo {
     pub driver: String,
     /// Largest buffer, in bytes.
     pub max_buffer: u64,
-    /// Largest range of a buffer that a shader can see at once, in bytes.
+    /// Largest part of a buffer that a shader can bind, in bytes.
     pub max_binding: u64,
-    /// Whether it is a software driver, which `auto` does not choose.
+    /// Whether it is a software driver, which `auto` never chooses.
     pub software: bool,
     /// Whether `auto` chooses this one.
     pub automatic: bool,
 }
 
-/// The process that has asked the drivers first; 0 before. Drivers have threads, locks and connections, which no process that is forked
-/// takes along.
+/// The first process that listed adapters, or 0. Threads, locks and connections do not survive forks.
 static ASKED_BY: AtomicU32 = AtomicU32::new(0);
 
-/// Whether they have said that there is nothing for `auto`.
+/// Whether the last listing had no adapter for `auto`.
 static NONE_AUTOMATIC: AtomicBool = AtomicBool::new(false);
 
 async fn adapters() -> Result<Vec<wgpu::Adapter>> {
@@ -53,8 +52,7 @@ pub(super) async fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> 
     let mut descriptor = wgpu::InstanceDescriptor {
         backends,
         flags: wgpu::InstanceFlags::empty(),
-        // Above this share of the memory that the driver reports, allocations are refused instead of evicting
-        // others' buffers.
+        // Above this share of the reported memory, allocations fail instead of evicting other buffers.
         memory_budget_thresholds: wgpu::MemoryBudgetThresholds {
             for_resource_creation: Some(95),
             for_device_loss: None,
@@ -69,7 +67,7 @@ pub(super) async fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> 
         }
         return instance.enumerate_adapters(backends).await;
     }
-    // A browser shows one of its adapters, the one that is asked for.
+    // A browser offers only one adapter for each request.
     let wanted = wgpu::RequestAdapterOptions {
         power_preference: wgpu::PowerPreference::HighPerformance,
         ..Default::default()
@@ -77,8 +75,8 @@ pub(super) async fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> 
     instance.request_adapter(&wanted).await.into_iter().collect()
 }
 
-/// Keeps the libraries of the drivers for as long as the process lives. With the last instance they would be unloaded, and threads that
-/// have used them call them once more when they end: with NVIDIA's driver that is a segmentation fault.
+/// Keeps the driver libraries loaded for the life of the process. The last instance would unload them, but
+/// threads that used them call into them when they end, which is a segmentation fault with NVIDIA's driver.
 fn keep_drivers(instance: &wgpu::Instance) {
     static KEPT: OnceLock<wgpu::Instance> = OnceLock::new();
     KEPT.get_or_init(|| instance.clone());
@@ -98,7 +96,7 @@ pub(super) fn driver(info: &wgpu::AdapterInfo) -> String {
     format!("{} {}", info.driver, info.driver_info).trim().to_owned()
 }
 
-/// The kinds of devices with their names, the preferred ones first.
+/// The kinds of devices with their names, preferred ones first.
 const KINDS: [(wgpu::DeviceType, &str); 5] = [
     (wgpu::DeviceType::DiscreteGpu, "discrete GPU"),
     (wgpu::DeviceType::IntegratedGpu, "integrated GPU"),
@@ -117,13 +115,13 @@ fn preferred(adapters: &[wgpu::Adapter]) -> Option<usize> {
     (0..adapters.len()).min_by_key(|&i| preference(adapters[i].get_info().device_type))
 }
 
-/// Whether `auto` would take this adapter. A browser does not say of what kind a GPU is.
+/// Whether `auto` may choose this adapter. Browsers do not report the kind of a GPU.
 fn is_automatic(info: &wgpu::AdapterInfo) -> bool {
     let in_browser = info.backend == wgpu::Backend::BrowserWebGpu;
     preference(info.device_type) <= if in_browser { 3 } else { 1 }
 }
 
-/// Every adapter of this machine, in the order of their indices. Empty where there is no driver.
+/// All adapters of this machine by index; empty without a driver.
 #[cfg(not(target_arch = "wasm32"))]
 #[must_use]
 pub fn devices() -> Vec<DeviceInfo> {
@@ -149,7 +147,7 @@ pub fn devices() -> Vec<DeviceInfo> {
         .collect()
 }
 
-/// The adapter that `wanted` names by its index or a part of its name, or the preferred one.
+/// The adapter that `wanted` names by index or part of its name; the preferred one if `None`.
 pub(super) async fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
     let mut adapters = adapters().await?;
     if adapters.is_empty() {
@@ -177,7 +175,7 @@ pub(super) async fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
 /// knows.
 #[must_use]
 pub fn may_have_gpu() -> bool {
-    // The kernel's graphics, NVIDIA, WSL, Arm, Qualcomm, Imagination.
+    // Device nodes of kernel graphics, NVIDIA, WSL, Arm, Qualcomm and Imagination.
     const NODES: [&str; 9] = ["dri", "nvidia", "nvhost", "nvgpu", "nvmap", "dxg", "mali", "kgsl", "pvr"];
     if !cfg!(target_os = "linux") {
         return true;
@@ -187,20 +185,20 @@ pub fn may_have_gpu() -> bool {
     names.any(|name| NODES.iter().any(|node| name.to_string_lossy().starts_with(node)))
 }
 
-/// Whether `auto` finds a suitable device. Where there is no GPU the driver is not asked, because a loader
-/// that finds no display may print to standard error.
+/// Whether `auto` finds a suitable device. Without a GPU the driver is not loaded, because a loader that
+/// finds no display may print to standard error.
 #[cfg(not(target_arch = "wasm32"))]
 #[must_use]
 pub fn has_automatic() -> bool {
     pollster::block_on(has_automatic_async())
 }
 
-/// As `has_automatic`, for a browser.
+/// Like `has_automatic`, for browsers.
 pub async fn has_automatic_async() -> bool {
     if !may_have_gpu() {
         return false;
     }
-    // Where they cannot be asked once more, whoever opens the device is told why.
+    // If drivers cannot be used again, opening the device reports why.
     let _ = adapters().await;
     !NONE_AUTOMATIC.load(Ordering::Acquire)
 }

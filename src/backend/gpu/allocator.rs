@@ -1,20 +1,20 @@
-//! How the buffers of a match are allocated.
+//! Allocation of the buffers of a match.
 
 use super::device::Device;
 use super::rows::{HALO, Rows};
 use super::uniform::ALIGN_WORDS;
 use crate::error::Result;
 
-/// What stages and copies do with buffers.
+/// Usage of the buffers of stages and copies.
 pub(super) const USAGE: wgpu::BufferUsages =
     wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST).union(wgpu::BufferUsages::COPY_SRC);
 
-/// Allocates buffers, and keeps track of them.
+/// Allocates and tracks buffers.
 pub(super) struct Allocator<'a> {
     pub(super) device: &'a mut Device,
     pub(super) written: Vec<wgpu::Buffer>,
     pub(super) constant: Vec<wgpu::Buffer>,
-    /// Buffers whose data nobody needs any more when the maps are made.
+    /// Buffers whose data are no longer needed in post-processing.
     pub(super) spare: Vec<wgpu::Buffer>,
 }
 
@@ -30,7 +30,7 @@ impl<'a> Allocator<'a> {
         Ok(buffer)
     }
 
-    /// The smallest spare buffer that holds so many words, or else one that matches write.
+    /// The smallest spare buffer of at least `words` words, or else a new buffer that matches write.
     pub(super) fn spare_or_new(&mut self, label: &str, words: u64) -> Result<wgpu::Buffer> {
         let fits = |(_, buffer): &(usize, &wgpu::Buffer)| buffer.size() >= 4 * words;
         let spare = self.spare.iter().enumerate().filter(fits).min_by_key(|(_, buffer)| buffer.size());
@@ -40,7 +40,7 @@ impl<'a> Allocator<'a> {
         }
     }
 
-    /// A buffer that keeps these words from match to match.
+    /// A buffer with constant contents.
     pub(super) fn constant(&mut self, label: &str, words: &[u32]) -> Result<wgpu::Buffer> {
         let buffer = self.allocate(label, words.len() as u64, USAGE)?;
         self.device.write(&buffer, bytemuck::cast_slice(words))?;
@@ -69,7 +69,7 @@ impl<'a> Allocator<'a> {
         Rows::in_parts(words, starts, |_, rows| self.buffer(label, u64::from(words) * rows))
     }
 
-    /// The same, where the rows of `count` parts are needed at a time.
+    /// Like `rows`, with memory for `count` parts at a time.
     pub(super) fn ring(&mut self, label: &str, words: u32, starts: &[u32], count: usize) -> Result<Rows> {
         let rows = u64::from(starts[1] - starts[0] + 2 * HALO);
         let buffers = starts[1..].iter().take(count).map(|_| self.buffer(label, u64::from(words) * rows));

@@ -1,6 +1,6 @@
-//! The buffers of a match, allocated once, from the plan and its table of data ([`Data::array`]).
+//! The buffers of a match, allocated once from the plan and its table of data ([`Data::array`]).
 //!
-//! Where they fit, levels share buffers, so that one dispatch can go over several of them.
+//! Levels share buffers if they fit, so that one dispatch can process several levels.
 
 use super::allocator::{Allocator, USAGE};
 use super::device::{Device, ONE_ROW};
@@ -14,27 +14,27 @@ use std::collections::HashMap;
 
 /// All buffers of a match on a device.
 pub(super) struct Buffers {
-    /// The finest level that shares buffers with all coarser ones; the number of levels where none does.
+    /// The finest level that shares buffers with all coarser ones; the number of levels if none does.
     pub(super) finest_shared: usize,
     /// The parameters of each level.
     pub(super) levels: Vec<LevelParams>,
-    /// Every array by its name and level.
+    /// Every array by name and level.
     arrays: HashMap<(&'static str, usize), (Array, Rows)>,
-    /// Bound in the place of arrays that there are not: a binding of WGSL cannot be absent.
+    /// Bound in place of missing arrays, because WGSL bindings cannot be absent.
     nothing: wgpu::Buffer,
-    /// Workgroups of the dispatches that end when the label map has settled: as they are now, and from the start.
+    /// Workgroup counts of the dispatches that end once the label map has settled: current and initial ones.
     pub(super) groups: wgpu::Buffer,
     pub(super) all_groups: wgpu::Buffer,
     /// Number of these dispatches.
     pub(super) endings: u32,
-    /// Arrays that are zero when a match begins.
+    /// Arrays that are zeroed when a match starts.
     pub(super) zeroed: Vec<Data>,
     written: Vec<wgpu::Buffer>,
     constant: Vec<wgpu::Buffer>,
 }
 
-/// First rows of the parts of a level, and its height, where the widest rows have so many words. They are even, so that the two
-/// rows of a coarser pixel stay together; none has more than `most`.
+/// First rows of the parts of a level, and its height, for rows of up to `widest` words. They are even, so
+/// that both rows of a coarser pixel stay together. No part has more than `most` rows.
 fn part_starts(device: &Device, plan: &Plan, height: u32, widest: usize, most: u32) -> Result<Vec<u32>> {
     let fitting = device.max_buffer / (4 * widest as u64);
     if fitting.min(u64::from(most)) >= u64::from(height) {
@@ -49,12 +49,12 @@ fn part_starts(device: &Device, plan: &Plan, height: u32, widest: usize, most: u
     Ok((0..height).step_by(own as usize).chain([height]).collect())
 }
 
-/// How the rows of a level are split into parts.
+/// The split of the rows of a level into parts.
 struct Parts {
     whole: [u32; 2],
-    /// The parts of its graph, and of its volumes where all rows of them are held.
+    /// The parts of its graph, and of its volumes if all their rows are held.
     starts: Vec<u32>,
-    /// Where only some rows are held: the parts of the volumes, which take turns, and how many of them there is room for.
+    /// For a ring of rows: the parts of the volumes, which share its buffers, and the number of buffers.
     in_turns: Option<(Vec<u32>, usize)>,
 }
 
@@ -62,7 +62,7 @@ impl Parts {
     fn of(device: &Device, plan: &Plan, z: usize) -> Result<Self> {
         let words = |data: Data| data.array(plan).words;
         let narrow = words(Data::Incoming(z)).max(words(Data::Members(z)));
-        // A volume of two bytes a label is the widest beside that of all slots.
+        // A volume with two bytes per label is the widest besides the one with all slots.
         let wide =
             words(Data::Volume(Volume::Dependency(z))).max(2 * words(Data::Volume(Volume::Evidence(z))));
         let height = plan.levels[z].height as u32;
@@ -76,7 +76,7 @@ impl Parts {
         Ok(Self { whole: [0, height], starts, in_turns: in_turns.transpose()? })
     }
 
-    /// Memory of its own for an array of the level.
+    /// Allocates an array of the level.
     fn rows(&self, a: &mut Allocator, data: Data, array: &Array) -> Result<Rows> {
         let words = array.words as u32;
         match (&self.in_turns, data) {
@@ -92,7 +92,7 @@ impl Buffers {
     /// All buffers for `plan`.
     ///
     /// # Errors
-    /// [`Error::Memory`] when it does not fit, [`Error::Device`] when the device fails.
+    /// [`Error::Memory`] if it does not fit, [`Error::Device`] if the device fails.
     pub(super) fn new(device: &mut Device, plan: &Plan) -> Result<Self> {
         if let Some(available) = device.memory.filter(|&m| m < plan.bytes()) {
             let (name, needed) = (device.name.clone(), plan.bytes());
@@ -106,7 +106,7 @@ impl Buffers {
         let pools =
             (finest_shared < levels.len()).then(|| Self::pools(a, plan, finest_shared)).transpose()?;
         let mut pools = pools.unwrap_or_default();
-        // Levels take turns with it.
+        // Levels share this buffer.
         let most = (1..levels.len()).map(|z| Data::NextGuide(z).array(plan).bytes() / 4).max().unwrap_or(0);
         let next_guide = a.buffer("next guide", most)?;
         for z in (0..levels.len()).rev() {
@@ -138,7 +138,7 @@ impl Buffers {
             }
         }
         if plan.shares {
-            // Post-processing reads no volume but costs. Levels share buffers, and so do parts that take turns.
+            // Post-processing reads no volumes but costs. Levels share buffers, and so do parts of a ring.
             let volumes = (0..levels.len()).flat_map(Data::of_levels).filter(|data| data.volume().is_some());
             let volumes = volumes.filter_map(|data| arrays.get(&(data.array(plan).name, data.level()?)));
             for buffer in volumes.flat_map(|(_, rows)| rows.buffers()) {
@@ -173,7 +173,7 @@ impl Buffers {
         })
     }
 
-    /// Memory for an array that belongs to no level. Of a band, there are as many rows as the device can bind.
+    /// Allocates an array that belongs to no level. A band gets at most as many rows as the device can bind.
     fn rows_of_match(a: &mut Allocator, plan: &Plan, array: &Array) -> Result<Rows> {
         let (words, mut rows) = (array.words as u32, array.rows as u64);
         if array.of_band && array.place == Place::AnyVolume {
@@ -190,10 +190,10 @@ impl Buffers {
         })
     }
 
-    /// The finest level that shares buffers with all coarser ones: as many as fit in what a shader may see at once.
+    /// The finest level that shares buffers with all coarser ones: as many levels as fit in a binding.
     pub(super) fn finest_shared(device: &Device, plan: &Plan) -> usize {
         let most = device.max_binding.min(device.max_buffer);
-        // A level of which some rows are held at a time keeps them for itself.
+        // A level with a ring of rows does not share.
         let first = usize::from(!plan.holds_all_rows());
         let mut sizes = Data::of_levels(0).map(|_| 0);
         let mut finest = plan.levels.len();
@@ -222,32 +222,32 @@ impl Buffers {
         pools.collect()
     }
 
-    /// The array of this name at `level`, if there is one. Names are those of bindings: see [`Data::bound`].
+    /// The array that is bound as `name` at `level`, if it exists; see [`Data::bound`].
     pub(super) fn named(&self, name: &'static str, level: usize) -> Option<&(Array, Rows)> {
         self.arrays.get(&Data::place_of(name, level))
     }
 
-    /// The array of data that there are.
+    /// The array of `data`, which must exist.
     pub(super) fn rows(&self, plan: &Plan, data: Data) -> &Rows {
         &self.arrays[&(data.array(plan).name, data.level().unwrap_or(0))].1
     }
 
-    /// Volume `volume`, which there is.
+    /// The array of `volume`, which must exist.
     pub(super) fn volume(&self, plan: &Plan, volume: Volume) -> &Rows {
         self.rows(plan, Data::Volume(volume))
     }
 
-    /// The array of `map`, which there is.
+    /// The array of `map`, which must exist.
     pub(super) fn map(&self, plan: &Plan, map: Map) -> &Rows {
         self.rows(plan, Data::Map(map))
     }
 
-    /// A binding for an array that there is not.
+    /// A binding in place of a missing array.
     pub(super) fn nothing(&self) -> Binding {
         Binding::whole(&self.nothing)
     }
 
-    /// The parameters of level `z` where what it shares is bound, and where its volumes and its dependency messages begin there, in quads.
+    /// The parameters of level `z` in shared buffers, and the offsets of its volumes and its dependency messages there, in quads.
     pub(super) fn shared_params(&self, plan: &Plan, z: usize) -> (LevelParams, (u32, u32)) {
         let quad = 4 * plan.volume_width.bytes() as u64;
         let start = |data: Data, bytes: u64| self.rows(plan, data).start(bytes);
@@ -261,7 +261,7 @@ impl Buffers {
         (params, (start(belief, quad), start(dependency, quad)))
     }
 
-    /// Makes room for the workgroups of the dispatches that end when the map has settled.
+    /// Allocates the workgroup counts of the dispatches that end once the map has settled.
     pub(super) fn end_when_settled(
         &mut self,
         device: &mut Device,

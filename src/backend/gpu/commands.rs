@@ -1,4 +1,4 @@
-//! Turns stages into dispatches, in bands of rows where a buffer exceeds the device's largest binding.
+//! Records stages as dispatches, in bands of rows if a buffer exceeds the largest binding of the device.
 
 use super::buffers::Buffers;
 use super::device::{Device, ONE_ROW};
@@ -17,7 +17,7 @@ use std::ops::Range;
 pub(super) enum Command {
     Dispatch(Dispatch),
     Copy(Copy),
-    /// Makes a range of bytes 0.
+    /// Zeroes a range of bytes.
     Clear(wgpu::Buffer, Range<u64>),
 }
 
@@ -25,15 +25,15 @@ pub(super) struct Dispatch {
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) bind_group: wgpu::BindGroup,
     pub(super) groups: Groups,
-    /// Largest total number of loop iterations of all invocations.
+    /// Upper bound of the loop iterations of all invocations.
     pub(super) work: u64,
 }
 
 /// Workgroups of a dispatch.
 pub(super) enum Groups {
-    /// So many in x and y.
+    /// (x, y).
     Fixed(u32, u32),
-    /// As many as stand at this place of [`Buffers::groups`]: none, once the label map has settled.
+    /// Index of the counts in [`Buffers::groups`], which are zeroed once the label map has settled.
     UntilSettled(usize),
 }
 
@@ -48,19 +48,19 @@ pub(super) struct Pipeline {
 /// Compiled kernels.
 pub(super) type Pipelines = HashMap<Shader, Pipeline>;
 
-/// What a dispatch does at a level.
+/// The part of a dispatch at one level.
 struct Section {
     level: LevelParams,
     rows: Range<u32>,
-    /// Invocations in each of so many rows.
+    /// (invocations per row, rows).
     size: (u32, u32),
-    /// Where volumes and dependency messages begin in what is bound, in quads.
+    /// Offsets of volumes and dependency messages in the bindings, in quads.
     at: (u32, u32),
     /// The bytes of the stage's own uniform.
     own: Vec<u8>,
 }
 
-/// Collects the commands of a stage at a level. Only its entry points are generic over kernels, so that the rest is compiled once.
+/// Records the commands of a stage at a level. Only its entry points are generic over kernels, so that the rest is compiled once.
 pub(super) struct Recorder<'a> {
     pub(super) device: &'a mut Device,
     pub(super) pipelines: &'a mut Pipelines,
@@ -69,20 +69,20 @@ pub(super) struct Recorder<'a> {
     pub(super) level: usize,
     /// The rows of the level to record; `None` for all.
     pub(super) only: Option<Range<u32>>,
-    /// The rows that bindings with `source_` before their name show; those of the dispatch where that is `None`.
+    /// The rows for bindings with the prefix `source_`; `None` for the rows of the dispatch.
     pub(super) source: Option<Range<u32>>,
-    /// Where the workgroups of dispatches go that end when the label map has settled.
+    /// Collects the workgroup counts of dispatches that end once the label map has settled.
     pub(super) endings: Option<&'a mut Vec<[u32; 3]>>,
     pub(super) commands: Vec<Command>,
 }
 
 impl<'a> Recorder<'a> {
-    /// The array of these data.
+    /// The array of `data`.
     pub(super) fn array(&self, data: Data) -> &'a Rows {
         self.buffers.rows(self.plan, data)
     }
 
-    /// The parameters of the level, as the shaders get them.
+    /// The parameters of the level for shaders.
     pub(super) fn params(&self) -> LevelParams {
         self.buffers.levels[self.level]
     }
@@ -102,7 +102,7 @@ impl<'a> Recorder<'a> {
         self.each_band(&kernel.any(), bytes_of(own), &|height| (threads, height))
     }
 
-    /// The same with one invocation per row.
+    /// Like `rows`, with one invocation per row.
     pub(super) fn one_a_row<U: Layout>(&mut self, kernel: &Kernel<U>, own: &U) -> Result<()> {
         self.each_band(&kernel.any(), bytes_of(own), &|height| (height, 1))
     }
@@ -115,28 +115,28 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// The array that `kernel` binds, and which rows of it where the kernel runs over `rows`; `None` where there is none.
+    /// The array for a binding of `kernel`, and its rows if the kernel runs over `rows`; `None` if it does not exist.
     fn place(&self, kernel: &Kernel, bound: &Bound, rows: &Range<u32>) -> Option<(&'a Rows, Range<u32>)> {
         let (array, held) = self.buffers.named(bound.data, self.level_of(kernel))?;
         let is_source = bound.name.starts_with("source_");
         let rows = self.source.as_ref().filter(|_| is_source).unwrap_or(rows);
         let shown = array.extent.rows_of(self.plan, rows, self.extent_of(kernel), bound.around);
-        // A band begins at the first row of its array.
+        // Arrays of bands start at the first row of the band.
         Some((held, if array.of_band { 0..shown.end - shown.start } else { shown }))
     }
 
-    /// What `kernel` binds for a range of rows.
+    /// The bindings of `kernel` for a range of rows.
     fn bindings(&self, kernel: &Kernel, rows: &Range<u32>) -> Vec<Binding> {
         let binding = |bound| self.place(kernel, bound, rows).map(|(array, rows)| array.bind(&rows));
         kernel.bound.iter().map(|bound| binding(bound).unwrap_or_else(|| self.buffers.nothing())).collect()
     }
 
-    /// Records a copy.
+    /// Records copies.
     pub(super) fn copies(&mut self, copies: impl IntoIterator<Item = Copy>) {
         self.commands.extend(copies.into_iter().map(Command::Copy));
     }
 
-    /// Replaces an array by what a stage has put beside it.
+    /// Replaces an array by its successor.
     pub(super) fn replace(&mut self, data: Data, next: Data) {
         self.copies(self.array(next).copy_to(self.array(data)));
     }
@@ -153,7 +153,7 @@ impl<'a> Recorder<'a> {
         self.copies(self.array(written).exchange(&rows));
     }
 
-    /// Makes the rows of `data` 0, halos included.
+    /// Zeroes the rows of `data`, halos included.
     pub(super) fn clear(&mut self, data: Data) {
         let rows = self.own_rows();
         let cleared = self.array(data).within(&rows);
@@ -161,7 +161,7 @@ impl<'a> Recorder<'a> {
         self.renew(data);
     }
 
-    /// Does `record` at another level, for these rows of it.
+    /// Calls `record` at another level, for these rows of it.
     pub(super) fn at<T>(
         &mut self,
         level: usize,
@@ -175,8 +175,8 @@ impl<'a> Recorder<'a> {
         out
     }
 
-    /// Rows of `level` at which a band must end: the first and the last one, and between them the starts of the parts of the level's
-    /// volumes, of its graph and of the volumes of the next finer level.
+    /// Rows of `level` at which bands must end: the first and last row, and the starts of parts of the
+    /// level's volumes, its graph, and the volumes of the next finer level.
     fn cuts(&self, level: usize) -> Vec<u32> {
         let rows = if level == self.level { self.own_rows() } else { 0..self.buffers.levels[level].height };
         let starts = |data: Data| self.array(data).starts();
@@ -189,21 +189,21 @@ impl<'a> Recorder<'a> {
         [rows.start].into_iter().chain(between).chain([rows.end]).collect()
     }
 
-    /// Bands of at most `most` rows that no binding of these kernels exceeds the device's largest in, for kernels that bind no volumes.
-    /// Each kernel runs over so many rows more on either side.
+    /// Bands of at most `most` rows for which no binding of `kernels` exceeds the device's largest. The
+    /// kernels bind no volumes, and run over the given number of extra rows on either side.
     pub(super) fn bands_of(&self, kernels: &[(&Kernel, u32)], most: usize) -> Result<Vec<Range<u32>>> {
         let height = self.extent_of(kernels[0].0).rows(self.plan) as u32;
         let cuts: Vec<_> = (0..height).step_by(most).chain([height]).collect();
         self.bands(&cuts, kernels)
     }
 
-    /// The same between given `cuts`.
+    /// Like `bands_of`, with bands that end at `cuts`.
     fn bands(&self, cuts: &[u32], kernels: &[(&Kernel, u32)]) -> Result<Vec<Range<u32>>> {
         let limit = self.device.max_binding;
         let size = |kernel: &Kernel, bound: &Bound, rows: &Range<u32>| {
             let Some((array, rows)) = self.place(kernel, bound, rows) else { return 0 };
             let bytes = array.row_bytes() * rows.len() as u64;
-            // Of a band, there may be room for fewer rows.
+            // Arrays of bands may have fewer rows than requested.
             if rows.end > array.height() { bytes.max(limit + 1) } else { bytes }
         };
         let largest = |rows: &Range<u32>| {
@@ -251,8 +251,8 @@ impl<'a> Recorder<'a> {
         self.dispatch_sections(kernel, &[section], &bindings)
     }
 
-    /// Dispatches `kernel` for all rows of `levels` at once, which share their buffers. `own` gives the parameters of a level and its
-    /// number of invocations in a row.
+    /// Dispatches `kernel` once for all rows of `levels`, which share buffers. `own` returns the parameters
+    /// of a level and its number of invocations per row.
     pub(super) fn levels<U: Layout>(
         &mut self,
         kernel: &Kernel<U>,
@@ -267,7 +267,7 @@ impl<'a> Recorder<'a> {
             Section { level, rows: 0..level.height, size: (threads, level.height), at, own }
         });
         let sections: Vec<_> = sections.collect();
-        // The buffers of any of the levels hold all of them.
+        // The shared buffers contain all of the levels.
         let bound = kernel.bound.iter().map(|bound| {
             let named = levels.clone().find_map(|z| self.buffers.named(bound.data, z));
             named.map_or_else(|| self.buffers.nothing(), |(_, rows)| rows.whole())
@@ -303,7 +303,7 @@ impl<'a> Recorder<'a> {
             bytes.extend(uniform::bytes(&Header { level: *level, band }, own));
             first_group += groups(section) as u32;
         }
-        // The shader's array has room for all levels.
+        // The array in the shader has the size for all levels.
         bytes.resize(bytes.len() / sections.len() * kernel.sections, 0);
         let work: u64 = sections.iter().map(|s| u64::from(s.size.0) * u64::from(s.size.1)).sum();
         let device = self.device.inner()?;

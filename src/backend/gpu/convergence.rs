@@ -1,21 +1,21 @@
-//! Whether the label map has settled, as a device finds it.
+//! The convergence of the label map on a device.
 
 use bytemuck::{Pod, Zeroable};
 
-/// What [`Stage::Change`](crate::backend::Stage::Change) has found so far, as its shader keeps it.
+/// The state of [`Stage::Change`](crate::backend::Stage::Change) in its shader.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub(super) struct Convergence {
     sum: [u32; 2],
     runs: u32,
-    /// 1 once it has.
+    /// 1 once the map has settled.
     pub(super) settled: u32,
-    /// How often the map had settled before.
+    /// Number of iterations after the map had settled.
     pub(super) idle: u32,
 }
 
 impl Convergence {
-    /// What these words say.
+    /// Decodes the words of the shader's state.
     pub(super) fn of(words: &[u32]) -> Self {
         *bytemuck::from_bytes(&bytemuck::cast_slice(words)[..size_of::<Self>()])
     }

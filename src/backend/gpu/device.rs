@@ -1,4 +1,4 @@
-//! A device, open on an adapter: it takes commands, gives back what they leave, and reports its failures.
+//! An open device: submits commands, reads back buffers, and reports failures.
 
 use super::adapters::{adapters_of, api, driver, select};
 use super::pace::Pace;
@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use web_time::Instant;
 
-/// Limits and failures injected on purpose: tests run the engine as if on a weaker device, or a failing one.
+/// Limits and failures for tests, which run the engine as if on a weaker or failing device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FaultInjection {
     /// Largest binding in bytes.
@@ -23,30 +23,30 @@ pub struct FaultInjection {
     pub max_invocations: Option<u32>,
     /// Size of its memory in bytes.
     pub memory: Option<u64>,
-    /// How long a submission may take.
+    /// Time limit of a submission.
     pub patience: Option<Duration>,
-    /// The device is lost after this many stages.
+    /// Lose the device after this many stages.
     pub lost_after: Option<usize>,
-    /// It has no timestamp queries.
+    /// Disable timestamp queries.
     pub no_clock: bool,
-    /// In place of a driver, a backend that accepts every command and computes nothing.
+    /// Instead of a driver, use a backend that accepts every command and computes nothing.
     pub noop: bool,
 }
 
-/// How long a submission may take before the device counts as hung. Drivers with a watchdog give up sooner. A
-/// software driver shares a processor with everything else that runs there.
+/// Time limit of a submission, after which the device counts as hung. Drivers with a watchdog stop earlier.
+/// Software drivers compete for the processor.
 const PATIENCE: Duration = Duration::from_secs(60);
 const SOFTWARE_PATIENCE: Duration = Duration::from_secs(600);
-/// Largest number of submissions in flight: more keep no device busier, and a hang would be noticed late. In a browser one is enough, and
-/// what the bar shows as done is done.
+/// Largest number of submissions in flight: more would not keep a device busier, and would delay the
+/// detection of a hang. In a browser, one is enough, and makes the progress bar exact.
 const SUBMISSIONS: usize = if cfg!(target_arch = "wasm32") { 1 } else { 4 };
 
-/// The least that a dispatch sees at once.
+/// Describes the smallest unit of a dispatch in errors.
 pub(super) const ONE_ROW: &str = "one row of the image and what it depends on";
 
 /// An open device with its queue and the first failure it reported.
 pub(super) struct Device {
-    /// `None` once the device hangs.
+    /// `None` once the device has hung.
     open: Option<(wgpu::Device, wgpu::Queue)>,
     pub(super) name: String,
     pub(super) driver: String,
@@ -56,14 +56,14 @@ pub(super) struct Device {
     pub(super) max_buffer: u64,
     pub(super) max_groups: u32,
     pub(super) memory: Option<u64>,
-    /// Nanoseconds per tick of its timestamps, where it has them.
+    /// Nanoseconds per timestamp tick, if it has timestamps.
     pub(super) tick: Option<f64>,
-    /// How much is submitted at once.
+    /// Limit of the work per submission.
     pub(super) pace: Pace,
     patience: Duration,
     lost_after: Option<usize>,
     under_way: VecDeque<Submission>,
-    /// When the last submission that ended was seen to end.
+    /// End of the last finished submission, as observed.
     last_end: Instant,
     /// Submissions so far, including those in flight.
     submitted: u64,
@@ -81,7 +81,7 @@ impl Device {
         };
         let info = adapter.get_info();
         let offered = adapter.limits();
-        // No more than every WebGPU device has, except for the sizes of buffers and bindings.
+        // Only the default WebGPU limits, except for the sizes of buffers and bindings.
         let mut limits = wgpu::Limits::default().or_worse_values_from(&offered);
         limits.max_buffer_size = offered.max_buffer_size.min(faults.max_buffer.unwrap_or(u64::MAX));
         limits.max_storage_buffer_binding_size =
@@ -114,7 +114,7 @@ impl Device {
                 }
             }
         };
-        // A browser may not tell the name.
+        // A browser may hide the name.
         let api = api(info.backend);
         let name = if info.name.is_empty() { api.into() } else { format!("{} ({api})", info.name) };
         let (uncaptured, device_name) = (note(&failure), name.clone());
@@ -128,7 +128,7 @@ impl Device {
         }));
         let (lost, device_name) = (note(&failure), name.clone());
         device.set_device_lost_callback(move |reason, message| {
-            // Dropping the device calls this too, when nobody listens any more.
+            // Dropping the device also calls this, when it no longer matters.
             lost(failed(&device_name, &format!("the device was lost ({reason:?}) {message}")));
         });
         let software = info.device_type == wgpu::DeviceType::Cpu;
@@ -181,7 +181,7 @@ impl Device {
         Ok(self.inner()?.create_buffer(&descriptor))
     }
 
-    /// That a buffer for `what`, or what a shader sees of it at once, takes more than this device allows.
+    /// The error that a buffer, or its binding, for `what` exceeds the limit of this device.
     pub(super) fn too_large(&self, what: impl Into<String>, needed: u64, allowed: u64) -> Error {
         MemoryError::Buffer { name: self.name.clone(), what: what.into(), needed, allowed }.into()
     }
@@ -196,13 +196,13 @@ impl Device {
         Ok(())
     }
 
-    /// Submits what is recorded. `is_full` says that it is as much as may be submitted at once.
+    /// Submits the recorded commands. `is_full` if they reach the limit of work per submission.
     pub(super) fn submit(&mut self, encoder: wgpu::CommandEncoder, is_full: bool) -> Result<()> {
         let queue = self.queue()?;
         let index = queue.submit([encoder.finish()]);
         let (sender, done) = oneshot::channel();
         if cfg!(target_arch = "wasm32") {
-            // Nobody listens if the match was stopped.
+            // The receiver is gone if the match was stopped.
             queue.on_submitted_work_done(move || {
                 let _ = sender.send(());
             });
@@ -235,7 +235,7 @@ impl Device {
             return Ok(());
         };
         if cfg!(target_arch = "wasm32") {
-            // The browser ends work that takes too long. The device is lost then.
+            // The browser ends work that takes too long, and then the device is lost.
             done.await.map_err(|e| failed(&self.name, &e))?;
             let last = std::mem::replace(&mut self.last_end, Instant::now());
             if is_full {
@@ -251,7 +251,7 @@ impl Device {
                 self.under_way.clear();
                 Err(self.hung())
             }
-            // The device accepted a submission silently and is gone, so the submission does not exist.
+            // A lost device accepts submissions silently, but they do not exist.
             Err(wgpu::PollError::WrongSubmissionIndex(..)) => {
                 self.check()?;
                 Err(failed(&self.name, &"the device was lost"))
@@ -260,9 +260,9 @@ impl Device {
         }
     }
 
-    /// Requests buffers, as they are after everything submitted so far.
+    /// Requests buffers in their state after all submissions so far.
     pub(super) fn request(&mut self, buffers: Vec<wgpu::Buffer>) -> Result<Requested> {
-        // A device that is lost says so here, and not that the buffers are wrong.
+        // A lost device reports it here; later, the buffers would seem invalid.
         self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
         self.check()?;
         let mut requested = Requested { buffers: Vec::new(), submitted: self.submitted };
@@ -270,7 +270,7 @@ impl Device {
             self.traffic.bytes_down += buffer.size();
             let (sender, mapped) = oneshot::channel();
             buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-                // Nobody listens if the wait for it failed.
+                // The receiver is gone if waiting failed.
                 let _ = sender.send(result);
             });
             requested.buffers.push((buffer, mapped));
@@ -283,7 +283,7 @@ impl Device {
         self.read(requested, |all| all.iter().map(|words| words.to_vec()).collect()).await
     }
 
-    /// What `read` makes of the words of all requested buffers.
+    /// Calls `read` on the words of all requested buffers.
     pub(super) async fn read<T>(
         &mut self,
         requested: Requested,
@@ -291,7 +291,7 @@ impl Device {
     ) -> Result<T> {
         let later = (self.submitted - requested.submitted) as usize;
         self.wait_until_left(later).await?;
-        // Buffers whose submission finished long ago are mapped by any poll.
+        // Any poll maps buffers whose submission has finished.
         self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
         let mut views = Vec::new();
         for (buffer, mut mapped) in requested.buffers {
@@ -306,7 +306,7 @@ impl Device {
             views.push(buffer.get_mapped_range(..).map_err(|e| self.unread(&e))?);
         }
         let words = views.iter().map(|view| {
-            // No bytes need not be aligned.
+            // An empty view may be unaligned.
             if view.is_empty() { &[][..] } else { bytemuck::cast_slice(view) }
         });
         let words: Vec<&[u32]> = words.collect();
@@ -315,7 +315,7 @@ impl Device {
         Ok(read)
     }
 
-    /// The failure to read a buffer, or what is behind it.
+    /// The device's failure, or else the failure to read a buffer.
     fn unread(&self, reason: &dyn std::fmt::Display) -> Error {
         self.check().err().unwrap_or_else(|| failed(&self.name, reason))
     }
@@ -335,18 +335,18 @@ impl Device {
     }
 }
 
-/// Commands under way.
+/// Commands in flight.
 struct Submission {
     index: wgpu::SubmissionIndex,
-    /// In a browser, where there is nothing to poll, says when they are done.
+    /// Reports the end in a browser, which cannot poll.
     done: oneshot::Receiver<()>,
     /// When it was submitted.
     begun: Instant,
-    /// Whether as much was submitted as may be.
+    /// Whether it reached the limit of work per submission.
     is_full: bool,
 }
 
-/// Buffers being read back from the device, and whether each is there.
+/// Buffers being read back from the device, and whether each has arrived.
 pub(super) struct Requested {
     buffers: Vec<(wgpu::Buffer, oneshot::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>)>,
     /// Number of submissions after which they are complete.

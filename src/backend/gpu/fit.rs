@@ -1,4 +1,4 @@
-//! How a list goes on a device: which rows of level 0 it holds, and the commands of each run.
+//! Fits programs to a device: the rows of level 0 that it holds, and the commands of each run.
 
 use super::{Command, Gpu};
 use crate::error::{Purpose, Result};
@@ -8,10 +8,10 @@ use crate::program::{Run, together};
 use std::sync::Arc;
 
 impl Gpu {
-    /// Whether this device matches by `plan` with all rows of level 0 held: where the method's memory and its own are enough.
+    /// Whether to hold all rows of level 0: if the method's memory limit and the device's memory allow it.
     pub(super) fn holds_all_rows(&self, plan: &Plan) -> bool {
         let streamed = together::streamed(plan);
-        // What was settled for the last pair stays.
+        // Keep the decision for the last pair.
         let known = self.state.as_ref().map(|state| &state.plan);
         if let Some(known) = known.filter(|known| plan.fits(known) || streamed.fits(known)) {
             return known.holds_all_rows();

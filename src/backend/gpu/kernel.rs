@@ -1,4 +1,4 @@
-//! Kernels: the entry points of the shaders, each declared once, with the data that it binds.
+//! Kernels: the entry points of the shaders, each declared once, with its bindings.
 
 use super::shader::{Constant, Shader};
 use super::uniform::{Layout, UniformLayout};
@@ -9,10 +9,9 @@ use std::marker::PhantomData;
 /// Largest total number of loop iterations of one invocation.
 pub const MAX_LOOP_ITERATIONS: usize = 32_768;
 
-/// Declares the shader of a stage: its own uniform, and a row for each entry point:
-/// `ENTRY { NAME, NAME as DATA, NAME around ROWS } => VARIANT;`. The names are those of the shader, and say which data they bind (see
-/// [`Data::bound`](crate::stage::Data::bound)) unless `as` does, with so many rows around those that the kernel runs over. `ENTRY(plan, level)` gives
-/// the kernel, and `kernels(plan, level)` lists all, except those whose condition does not hold (`if ...` before the `=>`).
+/// Declares the shader of a stage: its own uniform, and a row for each entry point: `ENTRY { NAME, NAME as DATA, NAME around ROWS } => VARIANT;`. A
+/// name is a binding in the shader. It selects the data (see [`Data::bound`](crate::stage::Data::bound)) unless `as` does, with `around` extra rows
+/// on either side. `ENTRY(plan, level)` returns the kernel, and `kernels(plan, level)` all those whose condition (`if ...` before the `=>`) holds.
 macro_rules! shader {
     (
         $stage:literal($plan:ident, $level:ident) { $( $field:ident: $type:ty ),* $(,)? }
@@ -55,7 +54,7 @@ macro_rules! shader {
 
 pub(super) use shader;
 
-/// How a plan specialises a kernel.
+/// The specialization of a kernel for a plan.
 #[derive(Clone, Debug)]
 pub(super) struct Variant {
     loops: usize,
@@ -67,12 +66,12 @@ pub(super) struct Variant {
 }
 
 impl Variant {
-    /// At most `loops` loop iterations of one invocation, and no constants.
+    /// With at most `loops` loop iterations per invocation, and no constants.
     pub(super) fn new(loops: usize) -> Self {
         Self { loops, width: None, constants: Vec::new(), sections: 1, extent: None, coarser: false }
     }
 
-    /// Messages and beliefs have this width.
+    /// Sets the width of messages and beliefs.
     pub(super) fn of_width(self, width: VolumeWidth) -> Self {
         Self { width: Some(width), ..self }
     }
@@ -83,34 +82,34 @@ impl Variant {
         self
     }
 
-    /// One dispatch may go over all levels of `plan`.
+    /// Allows one dispatch to process all levels of `plan`.
     pub(super) fn over_levels(self, plan: &Plan) -> Self {
         let sections = plan.levels.len();
         Self { sections, ..self.with("SECTIONS", sections as u32) }
     }
 
-    /// It runs over rows of this extent, and not over those of its level.
+    /// Runs over rows of this extent instead of those of its level.
     pub(super) fn over(self, extent: Extent) -> Self {
         Self { extent: Some(extent), ..self }
     }
 
-    /// It runs at the next coarser level than its stage.
+    /// Runs at the next coarser level than its stage.
     pub(super) fn at_coarser_level(self) -> Self {
         Self { coarser: true, ..self }
     }
 }
 
-/// A kernel as a plan specialises it, before there is a device; `U` is the uniform of its stage, or any.
+/// A specialized kernel, before it is compiled for a device; `U` is the uniform of its stage, or erased.
 #[derive(Clone, Debug)]
 pub struct Kernel<U = ()> {
     /// The entry point and its constants.
     pub shader: Shader,
-    /// Largest total number of loop iterations of one invocation. Mesa 22 stops a shader silently after about
+    /// Upper bound of the loop iterations of one invocation. Mesa 22 stops a shader silently after about
     /// 65,000.
     pub loops: usize,
-    /// The uniform that it reads: one, or an array of one for each of so many levels.
+    /// The layout of its uniform: one, or an array with one for each level.
     pub uniform: UniformLayout,
-    /// What it binds beside the uniform.
+    /// The bindings besides the uniform.
     pub bound: Vec<Bound>,
     /// Whether it runs at the next coarser level than its stage.
     pub coarser: bool,
@@ -124,15 +123,15 @@ pub struct Kernel<U = ()> {
 pub struct Bound {
     /// Its name in the shader.
     pub name: &'static str,
-    /// The name of its data, where the shader has another one.
+    /// The name of its data, which may differ.
     pub data: &'static str,
-    /// Rows that the kernel reads on either side of those that it runs over.
+    /// Extra rows that the kernel reads on either side of those that it runs over.
     pub around: u32,
 }
 
 #[allow(private_bounds, reason = "outside, a kernel has any uniform")]
 impl<U: Layout> Kernel<U> {
-    /// The kernel of an entry point, which binds arrays with so many rows around.
+    /// The kernel of an entry point; `bound` gives names and extra rows on either side.
     pub(super) fn new(mut shader: Shader, bound: Vec<(&'static str, u32)>, variant: Variant) -> Self {
         let Variant { loops, width, constants, sections, extent, coarser } = variant;
         (shader.width, shader.constants) = (width, constants);
@@ -141,7 +140,7 @@ impl<U: Layout> Kernel<U> {
         Self { shader, loops, uniform, bound, coarser, sections, extent, own: PhantomData }
     }
 
-    /// Takes the array `name` of the shader from these data.
+    /// Sets the data of the binding `name`.
     pub(super) fn taking(mut self, name: &str, data: &'static str) -> Self {
         for bound in self.bound.iter_mut().filter(|bound| bound.name == name) {
             bound.data = data;

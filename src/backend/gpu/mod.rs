@@ -1,12 +1,12 @@
-//! The GPU path: wgpu on Vulkan or Metal, one shader or a few a stage.
+//! The GPU path: wgpu on Vulkan or Metal, with one or a few shaders per stage.
 //!
-//! Volumes are \[y\]\[slot\]\[quad\]\[x\]: four labels of all pixels of a row, then the next four, and so of one slot after the
-//! other, packed four 8-bit or two 16-bit values a word; labels are padded to blocks of 16. Rows start at multiples of 256
-//! bytes, so that any rows of a volume can be bound: where a volume exceeds what a device lets a shader see at once, a stage
-//! runs band by band, each band bound with the rows above and below that it reads; where it exceeds the largest buffer, it is
-//! several (`buffers`). The pair goes up once, the maps come down once, and in between nothing leaves the device.
-//! Where message passing stops by itself, [`Stage::Change`] decides that there: from then on, it makes the dispatches of the
-//! messages empty.
+//! Volumes are \[y\]\[slot\]\[quad\]\[x\]: the first four labels of all pixels of a row, then the next four,
+//! and so on, slot by slot, packed as four 8-bit or two 16-bit values per word; labels are padded to blocks
+//! of 16. Rows start at multiples of 256 bytes, so that any rows of a volume can be bound. If a volume
+//! exceeds the largest binding of a device, a stage runs in bands, each bound with the rows above and below
+//! that it reads; if it exceeds the largest buffer, it is split into several (`buffers`). The pair is
+//! uploaded once and the maps are downloaded once. If message passing may stop early, [`Stage::Change`]
+//! decides that on the device, and then makes the dispatches of messages empty.
 
 mod adapters;
 mod allocator;
@@ -67,7 +67,7 @@ pub struct Gpu {
     work: u64,
     timer: Option<Timer>,
     state: Option<State>,
-    /// That of another size, where both are small enough: a match at two sizes goes to and fro.
+    /// State of the other size of a double-size match, kept if both fit in memory.
     other: Option<State>,
     requests: Requests<RequestedMaps>,
 }
@@ -75,42 +75,42 @@ pub struct Gpu {
 /// The commands of each run.
 type Commands = HashMap<Run, Arc<[Command]>>;
 
-/// Everything that belongs to one plan.
+/// Everything that depends on the plan.
 struct State {
     plan: Plan,
     buffers: Buffers,
     commands: Commands,
-    /// Those of [`upload`].
+    /// The commands that upload the pair.
     upload: Arc<[Command]>,
-    /// Words of an image on their way up.
+    /// Words of an image, for upload.
     words: Vec<u32>,
 }
 
 impl Gpu {
-    /// Opens the device that `wanted` names, by its index or a part of its name, or the best there is.
+    /// Opens the device that `wanted` names by index or part of its name, or the preferred one.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] when there is no driver or the device cannot be opened, [`crate::Error::Execution`] when no device has
-    /// that name.
+    /// [`crate::Error::Device`] without a driver or if the device cannot be opened;
+    /// [`crate::Error::Execution`] if no device has that name.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn new(wanted: Option<&str>) -> Result<Self> {
         Self::with_faults(wanted, FaultInjection::default())
     }
 
-    /// As `new`, with faults.
+    /// Like `new`, with faults.
     ///
     /// # Errors
-    /// As `new`.
+    /// The errors of `new`.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn with_faults(wanted: Option<&str>, faults: FaultInjection) -> Result<Self> {
         pollster::block_on(Self::open_async(wanted, faults))
     }
 
-    /// As `with_faults`, for a browser.
+    /// Like `with_faults`, for browsers.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] when there is no driver or the device cannot be opened, [`crate::Error::Execution`] when no device has
-    /// that name.
+    /// [`crate::Error::Device`] without a driver or if the device cannot be opened;
+    /// [`crate::Error::Execution`] if no device has that name.
     pub async fn open_async(wanted: Option<&str>, faults: FaultInjection) -> Result<Self> {
         Ok(Self {
             device: Device::open(wanted, faults).await?,
@@ -125,7 +125,7 @@ impl Gpu {
         })
     }
 
-    /// The commands of all stages, at single levels and where these share buffers at several together.
+    /// The commands of all stages at single levels, and of joined levels that share buffers.
     fn all_commands(&mut self, plan: &Plan, buffers: &mut Buffers) -> Result<Commands> {
         let mut commands = HashMap::new();
         let mut endings = Vec::new();
@@ -140,7 +140,7 @@ impl Gpu {
                 commands.insert(run, recorded);
             }
         }
-        // This stage makes the dispatches of messages empty: it comes when these are known.
+        // `Change` zeroes the indirect workgroup counts, which must be known before it is recorded.
         buffers.end_when_settled(&mut self.device, plan, &endings)?;
         Ok(commands)
     }
@@ -155,7 +155,7 @@ impl Gpu {
     ) -> Result<Arc<[Command]>> {
         let level = run.stage.level().unwrap_or(0);
         self.recorded_at(level, plan, buffers, endings, |recorder| {
-            recorder.only = run.part.as_ref().map(|part| part.rows.start as u32..part.rows.end as u32);
+            recorder.only = run.band.as_ref().map(|band| band.rows.start as u32..band.rows.end as u32);
             match record_levels(run.stage) {
                 Some(record) if run.levels > 1 => record(recorder, level..level + run.levels),
                 _ => record(recorder, run.stage),
@@ -192,7 +192,7 @@ impl Gpu {
         self.state.as_ref().expect("prepare comes before every stage")
     }
 
-    /// Buffers and commands for a plan.
+    /// Creates buffers and commands for a plan.
     fn begin(&mut self, plan: &Plan) -> Result<State> {
         if self.device.software {
             memory::check(plan.bytes(), Purpose::Match)?;
@@ -204,7 +204,7 @@ impl Gpu {
         Ok(State { plan: plan.clone(), buffers, commands, upload, words: vec![0; words] })
     }
 
-    /// Puts the pair and its label ranges into the buffers, and messages at their start.
+    /// Uploads the pair and its label ranges, and resets the messages.
     fn load(&mut self, state: &mut State, prepared: &Prepared) -> Result<()> {
         let State { plan, buffers, words, upload, .. } = state;
         let device = &mut self.device;
@@ -231,7 +231,7 @@ impl Gpu {
             array(Data::LabelRange(z))
                 .write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
         }
-        // Where not all rows are held, those of a part become 0 when it is entered.
+        // With a ring of rows, rows are zeroed when they enter it.
         let by_parts = |data: &Data| !plan.holds_all_rows() && data.level() == Some(0);
         let encoder = self.encoder()?;
         for data in buffers.zeroed.iter().filter(|data| !by_parts(data)) {
@@ -248,7 +248,7 @@ impl Gpu {
         let size = buffers.all_groups.size();
         encoder.copy_buffer_to_buffer(&buffers.all_groups, 0, &buffers.groups, 0, size);
         if narrow {
-            // No run of a stage.
+            // The upload is no run of a stage, so it is not timed.
             let timer = self.timer.take();
             self.record(upload)?;
             self.timer = timer;
@@ -261,14 +261,14 @@ impl Gpu {
         buffers.rows(plan, Data::Convergence).own().remove(0)
     }
 
-    /// What [`Stage::Change`] has found so far.
+    /// The current state of [`Stage::Change`].
     async fn convergence(&mut self) -> Result<Convergence> {
         let at = self.convergence_at();
         let requested = self.request(&[at])?;
         Ok(Convergence::of(&self.device.collect(requested).await?[0]))
     }
 
-    /// Width, height, and elements in a row of a map.
+    /// Width, height, and elements per row of a map.
     fn map_shape(&self, map: Map) -> (usize, usize, usize) {
         let plan = &self.state().plan;
         let (width, height) = map.size(plan);
@@ -277,7 +277,7 @@ impl Gpu {
     }
 }
 
-/// A plane of what `value` makes of the words of a map, which has so many (columns, rows, words a row).
+/// Converts the words of a map, of the shape (width, height, words per row), with `value`.
 fn plane<T>(
     words: &[u32],
     (width, height, pitch): (usize, usize, usize),
@@ -290,9 +290,9 @@ fn plane<T>(
     Plane::new(width, height, values)
 }
 
-/// Maps on their way from the device.
+/// Maps being read back from the device.
 struct RequestedMaps {
-    /// Disparity, raw disparity, flags; and where message passing may stop by itself, its [`Convergence`].
+    /// Disparity, raw disparity, flags; and [`Convergence`] if message passing may stop early.
     parts: device::Requested,
     shape: (usize, usize, usize),
 }
@@ -308,7 +308,7 @@ impl Backend for Gpu {
 
     fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()> {
         if self.state.as_ref().is_some_and(|state| plan.fits(&state.plan)) {
-            // The maps stay, as all that was asked for leaves them.
+            // The maps stay; finish what was recorded for them.
             self.submit()?;
         }
         (self.encoder, self.passes, self.work) = (None, 0, 0);
@@ -324,7 +324,7 @@ impl Backend for Gpu {
                 }
                 state
             }
-            // What the match before the last one holds goes before this one asks for more.
+            // Free the match before the last one before allocating.
             older => {
                 drop(older);
                 let most = u64::from(plan.memory) << 20;
@@ -348,7 +348,7 @@ impl Backend for Gpu {
         program.each_frame(|plan, steps| {
             let steps = if self.holds_all_rows(plan) { steps } else { together::pass(plan, steps) };
             let steps = sharing::pass(plan, steps);
-            // The time of each level is taken by itself.
+            // Levels are timed separately, so they are not joined.
             let shared = Buffers::finest_shared(&self.device, plan);
             if self.timer.is_none() { joined::join(plan, shared, steps) } else { steps }
         })
@@ -381,7 +381,7 @@ impl Backend for Gpu {
     }
 
     fn settled(&mut self, wait: bool) -> Promise<'_, bool> {
-        // Where times are kept, idle iterations are not to be among them.
+        // Timed matches must not contain idle iterations.
         let asked = wait || self.timer.is_some();
         Box::pin(async move { Ok(asked && self.convergence().await?.settled != 0) })
     }

@@ -1,52 +1,52 @@
-//! How much is submitted at once.
+//! The amount of work per submission.
 
 use std::time::Duration;
 
-/// Iterations of all loops of all invocations that are submitted at once, about: short enough for drivers that stop long jobs,
-/// and on a processor for a bar that moves.
+/// Approximate loop iterations of all invocations per submission: short enough for drivers that stop long
+/// jobs, and for progress bars with software drivers.
 const WORK: u64 = 1 << 32;
 const SOFTWARE_WORK: u64 = 1 << 30;
-/// The same in a browser at first.
+/// Initial value in browsers.
 const BROWSER_WORK: u64 = 1 << 24;
-/// Submissions that take less than this double.
+/// Submissions that take less than this grow twofold.
 const SHORT: Duration = Duration::from_millis(30);
-/// Submissions that take longer than this shrink: meanwhile there is no progress, and software drivers draw no page.
+/// Longer submissions shrink, because they delay progress bars, and the page itself with software drivers.
 const LONG: Duration = Duration::from_millis(200);
-/// Over so many submissions times are averaged. Browsers may tell of the end of two at once.
+/// Number of submissions to average times over. Browsers may report the ends of two at once.
 const ROUND: u32 = 2;
 
-/// How much is submitted at once. A browser does not say whether its device is a driver in software. So submissions there begin small and
-/// double, as long as they are short, or take hardly longer than those of half the size: then most of the time is the browser's, which
-/// looks only now and then for what has ended. One that takes too long makes the next ones smaller. That happens because the work is
-/// partly an estimate, and iterations after messages have settled take no time.
+/// The amount of work per submission. Browsers hide whether a device is a software driver, so submissions
+/// there start small. They double while they are short, or hardly longer than those of half the size, when
+/// most of the time is spent in the browser, which polls rarely. A submission that takes too long shrinks the
+/// next ones. That occurs because work is an estimate, and iterations after convergence take no time.
 #[derive(Debug)]
 pub(super) struct Pace {
     work: u64,
     grows: bool,
-    /// The mean time of submissions of half the size, once there were any.
+    /// Mean time of submissions of half the size, if there were any.
     half: Option<Duration>,
-    /// How many full submissions of this size have ended, and their time together.
+    /// Number of full submissions of this size that have ended, and their total time.
     ended: (u32, Duration),
 }
 
 impl Pace {
-    /// That of a device that is a driver in software, or is not.
+    /// For a software driver, or another device.
     pub(super) fn new(software: bool) -> Self {
         let work = if software { SOFTWARE_WORK } else { WORK };
         Self { work, grows: false, half: None, ended: (0, Duration::ZERO) }
     }
 
-    /// That in a browser.
+    /// For a device in a browser.
     pub(super) fn in_browser() -> Self {
         Self { work: BROWSER_WORK, grows: true, ..Self::new(false) }
     }
 
-    /// Iterations of loops that are submitted at once.
+    /// Loop iterations per submission.
     pub(super) fn work(&self) -> u64 {
         self.work
     }
 
-    /// A full submission has ended. `took` counts from when it was submitted, or from the end of the one before it if that was later.
+    /// Records the end of a full submission. `took` counts from its start or the previous end, whichever was later.
     pub(super) fn end(&mut self, took: Duration) {
         if !self.grows {
             return;
@@ -74,8 +74,8 @@ impl Pace {
 mod tests {
     use super::*;
 
-    /// What is submitted at once after many submissions, where two are told of together at the end of every `look`, and a device does so
-    /// many iterations in a microsecond.
+    /// Work per submission after many submissions, if the browser polls every `look` and reports two at once,
+    /// and the device runs `per_microsecond` iterations in a microsecond.
     fn settled(look: Duration, per_microsecond: u64) -> u64 {
         let mut pace = Pace::in_browser();
         for _ in 0..100 {
@@ -88,21 +88,21 @@ mod tests {
     }
 
     #[test]
-    fn it_grows_to_what_the_device_does_in_a_moment() {
+    fn work_grows_until_submissions_take_long() {
         let slow = 400;
         for (look, most) in [(0, 100), (100, 400)] {
             let work = settled(Duration::from_millis(look), slow);
             let milliseconds = work / slow / 1000;
             assert!((15..=most).contains(&milliseconds), "looked for every {look} ms: {milliseconds} ms");
         }
-        // A browser that looks seldom holds no fast device back.
+        // Rare polling does not slow down a fast device.
         for look in [0, 100] {
             assert_eq!(settled(Duration::from_millis(look), 400_000), WORK, "{look}");
         }
     }
 
     #[test]
-    fn what_takes_too_long_shrinks_it() {
+    fn work_shrinks_after_long_submissions() {
         let mut pace = Pace::in_browser();
         (0..40).for_each(|_| pace.end(Duration::ZERO));
         assert_eq!(pace.work(), WORK);
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn it_stays_on_devices_that_are_known() {
+    fn work_is_constant_outside_browsers() {
         for (software, work) in [(true, SOFTWARE_WORK), (false, WORK)] {
             let mut pace = Pace::new(software);
             (0..10).for_each(|_| pace.end(Duration::ZERO));

@@ -15,8 +15,7 @@ use pollster::block_on;
 use std::time::Duration;
 use web_time::Instant;
 
-/// Bytes that [`Gpu::copy_rate`] copies, its number of tries, and how long the copies of one try must take
-/// together, so that the overhead of a submission no longer counts.
+/// Bytes that [`Gpu::copy_rate`] copies, number of tries, and minimum time of a try, to hide overhead.
 const COPIED_BYTES: u64 = 1 << 28;
 const COPY_TRIES: u32 = 12;
 const LONG_COPY: Duration = Duration::from_millis(100);
@@ -143,7 +142,7 @@ impl Gpu {
     /// The rate at which the device copies between two large buffers: bytes read and written per second.
     ///
     /// # Errors
-    /// [`Error::Memory`] when there is no room for two such buffers, [`Error::Device`] when the device fails.
+    /// [`Error::Memory`] if two such buffers do not fit, [`Error::Device`] if the device fails.
     pub fn copy_rate(&mut self) -> Result<f64> {
         let size = COPIED_BYTES.min(self.device.max_buffer) & !3;
         let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
@@ -169,7 +168,7 @@ impl Gpu {
         Ok(best)
     }
 
-    /// The values of a map, whose words may hold other maps too.
+    /// The values of a map, whose words may contain other maps too.
     pub(super) async fn map_values(&mut self, map: Map) -> Result<Plane<i32>> {
         let (rows, words, word, bit, mask) = self.place_of(map);
         let data = self.words(&rows).await?;
@@ -201,8 +200,8 @@ impl Gpu {
     }
 }
 
-/// The word in a row of `volume` that holds a label of its line \[x\]\[slot\]. The shaders store the first
-/// four labels of all pixels together, then the next four, and so on, and the same for each slot.
+/// Index in a row of `volume` of the word with a label of its line \[x\]\[slot\]. Shaders store the first
+/// four labels of all pixels, then the next four, and so on, slot by slot.
 fn word_places(plan: &Plan, volume: Volume, per_word: usize) -> impl Fn(usize, usize) -> usize + use<> {
     let level = &plan.levels[volume.level()];
     let slots = volume_shape(plan, volume).0 / level.pixels();

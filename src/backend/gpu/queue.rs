@@ -1,4 +1,4 @@
-//! Puts commands in the queue of the device: records the commands of stages, submits them, and asks for what they leave.
+//! The queue of the device: records commands of stages, submits them, and requests results.
 
 use super::commands::{Command, Groups};
 use super::rows::Rows;
@@ -16,7 +16,7 @@ impl Gpu {
         Ok(self.encoder.as_mut().expect("just made"))
     }
 
-    /// Records commands, and submits whenever enough is recorded.
+    /// Records commands, and submits them when there is enough work.
     pub(super) fn record(&mut self, commands: &[Command]) -> Result<()> {
         let mut rest = commands;
         while let Some(first) = rest.first() {
@@ -73,7 +73,7 @@ impl Gpu {
         Ok(())
     }
 
-    /// Submits everything.
+    /// Submits all recorded commands.
     pub(super) fn submit(&mut self) -> Result<()> {
         let is_full = self.work >= self.device.pace.work();
         (self.passes, self.work) = (0, 0);
@@ -86,7 +86,7 @@ impl Gpu {
         self.device.check()
     }
 
-    /// Asks for each range of bytes, after everything recorded so far.
+    /// Requests ranges of bytes after all commands recorded so far.
     pub(super) fn request(&mut self, ranges: &[(wgpu::Buffer, Range<u64>)]) -> Result<device::Requested> {
         let mut staged = Vec::new();
         for (buffer, bytes) in ranges {

@@ -1,9 +1,9 @@
-//! Data stored row by row on a device, and what stages bind of it.
+//! Data stored by row on a device, and their bindings.
 //!
-//! Data larger than the device's largest buffer is split into parts of whole rows. Each part also holds a
-//! halo: a few rows of its neighbours, so that a stage that reads around a pixel finds everything in one
-//! part. A stage that writes data with a halo ends with copies that update those rows. Where only some rows are needed at a
-//! time, several parts take turns in a buffer.
+//! Data larger than the device's largest buffer are split into parts of whole rows. Each part also has a
+//! halo: a few rows of its neighbours, so that stages find the neighbourhood of a pixel in one part. Stages
+//! that write data with a halo copy these rows at the end. If only some rows are held, several parts share a
+//! buffer in turn.
 
 use super::device::Device;
 use crate::error::Result;
@@ -11,7 +11,7 @@ use crate::plan::GRAPH_WINDOW;
 use std::num::NonZero;
 use std::ops::Range;
 
-/// Halo of a part, in rows on either side: as far as any stage reads around a pixel in a volume.
+/// Halo of a part, in rows on either side: the largest neighbourhood that a stage reads in a volume.
 pub(super) const HALO: u32 = GRAPH_WINDOW as u32 / 2;
 
 /// `rows` with up to `halo` rows above and below.
@@ -19,12 +19,12 @@ pub(super) fn with_halo(rows: &Range<u32>, halo: u32, height: u32) -> Range<u32>
     rows.start.saturating_sub(halo)..rows.end.saturating_add(halo).min(height)
 }
 
-/// The rows that are in both.
+/// The intersection of two ranges of rows.
 pub(super) fn common(a: &Range<u32>, b: &Range<u32>) -> Range<u32> {
     a.start.max(b.start)..a.end.min(b.end)
 }
 
-/// Data stored row by row, in as few buffers as the device allows.
+/// Data stored by row, in as few buffers as the device allows.
 #[derive(Clone)]
 pub(super) struct Rows {
     parts: Vec<Part>,
@@ -34,16 +34,16 @@ pub(super) struct Rows {
 #[derive(Clone)]
 struct Part {
     buffer: wgpu::Buffer,
-    /// The rows that it owns.
+    /// Rows that belong to this part only.
     own: Range<u32>,
-    /// The rows that it holds, halo included.
+    /// Rows stored in it, halo included.
     held: Range<u32>,
-    /// Where they begin in the buffer, in bytes.
+    /// Offset of these in the buffer, in bytes.
     offset: u64,
 }
 
 impl Part {
-    /// Where `row` begins in the buffer.
+    /// Offset of `row` in the buffer, in bytes.
     fn at(&self, row: u32, row_bytes: u64) -> u64 {
         self.offset + u64::from(row - self.held.start) * row_bytes
     }
@@ -61,7 +61,7 @@ impl Binding {
         Self { buffer: buffer.clone(), bytes: 0..buffer.size() }
     }
 
-    /// Number of bytes that are bound.
+    /// Number of bound bytes.
     pub(super) fn size(&self) -> u64 {
         let end = self.bytes.end.min(self.buffer.size());
         end.saturating_sub(self.bytes.start)
@@ -85,8 +85,8 @@ pub(super) struct Copy {
 }
 
 impl Rows {
-    /// Rows of `words` words each, in parts that start at `starts`, whose last element is the height. `allocate` gives the buffer
-    /// of the part with this index, for so many rows.
+    /// Rows of `words` words each, in parts that start at `starts`, whose last element is the height.
+    /// `allocate` returns the buffer of a part by index, for a number of rows.
     pub(super) fn in_parts(
         words: u32,
         starts: &[u32],
@@ -102,14 +102,13 @@ impl Rows {
         Ok(Self { parts: parts.collect::<Result<_>>()?, row_bytes: 4 * u64::from(words) })
     }
 
-    /// One row of so many words, in a buffer of its own.
+    /// One row of `words` words, in a buffer of its own.
     pub(super) fn of(buffer: wgpu::Buffer, words: u32) -> Self {
         let part = Part { buffer, own: 0..1, held: 0..1, offset: 0 };
         Self { parts: vec![part], row_bytes: 4 * u64::from(words) }
     }
 
-    /// Binds `rows`, which one part owns, with as much of their halo as that part holds: for a stage that
-    /// writes the rows, or reads around them.
+    /// Binds `rows` of one part, which may be in its halo.
     pub(super) fn bind(&self, rows: &Range<u32>) -> Binding {
         let within = |outer: &Range<u32>| outer.start <= rows.start && rows.end <= outer.end;
         let part = self.parts.iter().find(|p| within(&p.own)).or(self.parts.iter().find(|p| within(&p.held)));
@@ -118,16 +117,16 @@ impl Rows {
         Binding { buffer: part.buffer.clone(), bytes: at(rows.start)..at(rows.end) }
     }
 
-    /// All of the buffer of its first part, whatever else that holds.
+    /// Binds the whole buffer of its first part, including other data.
     pub(super) fn whole(&self) -> Binding {
         Binding::whole(&self.parts[0].buffer)
     }
 
-    /// Copies of `written` rows to the halos of the parts that hold them too.
+    /// Copies of `written` rows to the halos of other parts.
     pub(super) fn exchange(&self, written: &Range<u32>) -> Vec<Copy> {
         let mut copies = Vec::new();
         for (i, to) in self.parts.iter().enumerate() {
-            // Parts of two rows, the smallest that there are, are seen from the next but one.
+            // The smallest parts have two rows, so halos reach the part after the next.
             for (j, from) in self.parts.iter().enumerate().take(i + 3).skip(i.saturating_sub(2)) {
                 let rows = common(&common(&to.held, &from.own), written);
                 if i != j && !rows.is_empty() {
@@ -180,7 +179,7 @@ impl Rows {
         self.parts.iter().map(|p| (p.buffer.clone(), at(p, p.own.start)..at(p, p.own.end))).collect()
     }
 
-    /// The byte range of each part of `rows` in its buffer, halo excluded.
+    /// The byte ranges of `rows` in each part's buffer, halo excluded.
     pub(super) fn within(&self, rows: &Range<u32>) -> impl Iterator<Item = (&wgpu::Buffer, Range<u64>)> {
         let parts =
             self.parts.iter().map(move |p| (p, common(&p.own, rows))).filter(|(_, rows)| !rows.is_empty());
@@ -193,7 +192,7 @@ impl Rows {
         self.parts.iter().map(move |p| (&p.buffer, at(p, p.held.start)..at(p, p.held.end)))
     }
 
-    /// Where the first row begins in its buffer, in elements of so many bytes.
+    /// Offset of the first row in its buffer, in elements of `bytes` bytes.
     pub(super) fn start(&self, bytes: u64) -> u32 {
         (self.parts[0].offset / bytes) as u32
     }
@@ -212,7 +211,7 @@ impl Rows {
 /// One buffer for several levels, coarsest first.
 pub(super) struct Pool {
     pub(super) buffer: wgpu::Buffer,
-    /// Words that are taken.
+    /// Words in use.
     taken: u64,
 }
 

@@ -1,5 +1,4 @@
-//! Shaders, assembled from their files: the stage's own file, the shared parts that it imports, and constants
-//! from Rust.
+//! Shaders, assembled from the stage's own file, the shared parts that it imports, and constants from Rust.
 
 use crate::maps::{FRACTION, flag};
 use crate::plan::{VolumeWidth, WINDOW_RUN};
@@ -82,7 +81,7 @@ fn constants_of(name: &str) -> Vec<(&'static str, Constant)> {
     }
 }
 
-/// An entry point of a stage's shader, with the constants that specialise it. Equal ones are compiled once.
+/// An entry point of a stage's shader, specialized by constants. Equal ones are compiled once.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Shader {
     /// Name of the stage that it belongs to.
@@ -92,17 +91,17 @@ pub struct Shader {
     text: &'static str,
     /// Width of messages and beliefs.
     pub(super) width: Option<VolumeWidth>,
-    /// The constants that specialise it.
+    /// The constants that specialize it.
     pub constants: Vec<(&'static str, Constant)>,
 }
 
 impl Shader {
-    /// The entry point `entry` of the shader of `stage`, whose file holds `text`.
+    /// The entry point `entry` of the shader of `stage`, with the file contents `text`.
     pub(super) const fn new(stage: &'static str, entry: &'static str, text: &'static str) -> Self {
         Self { stage, entry, text, width: None, constants: Vec::new() }
     }
 
-    /// The source of the shader: constants, then the imported parts, then its own file.
+    /// The source: constants, imported parts, then its own file.
     #[must_use]
     pub fn source(&self) -> String {
         let mut parts = Vec::new();
@@ -129,7 +128,7 @@ impl Shader {
     }
 }
 
-/// The number of the binding that the shader with this `source` calls `name`.
+/// The number of the binding `name` in the shader `source`.
 #[must_use]
 pub fn binding_number(source: &str, name: &str) -> Option<u32> {
     let bindings = source.lines().filter_map(|line| line.strip_prefix("@group(0) @binding("));
@@ -145,8 +144,7 @@ fn shared_part(name: &str) -> &'static str {
     SHARED.iter().find(|part| part.0 == name).expect("an import names a file in shaders/shared").1
 }
 
-/// `text` without its `#import` lines. The parts that they name, and the parts imported by those, are added
-/// to `parts`, each once.
+/// `text` without its `#import` lines. Adds imported parts, and their imports, to `parts` once each.
 fn without_imports<'a>(text: &'a str, parts: &mut Vec<&'a str>) -> String {
     let mut body = String::with_capacity(text.len());
     for line in text.lines() {

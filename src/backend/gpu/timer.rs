@@ -1,4 +1,4 @@
-//! The time of every stage, measured by the device's timestamps.
+//! The time of every stage, by timestamps of the device.
 
 use super::device::Device;
 use crate::backend::Stage;
@@ -6,15 +6,15 @@ use crate::error::Result;
 use std::time::Duration;
 use web_time::Instant;
 
-/// Passes recorded before they are submitted.
+/// Passes recorded per submission.
 pub(super) const PASSES_PER_SUBMIT: usize = 16;
 
-/// Records the times of passes, and sums those of one run of a stage.
+/// Records the times of passes, and sums them by run of a stage.
 pub(super) struct Timer {
     clock: Option<Clock>,
-    /// When the current run began, where the host measures.
+    /// Start of the current run, if the host measures.
     began: Option<Instant>,
-    /// The runs so far, with the host's measurement where the device has no timestamps.
+    /// The runs so far, with the host's measurement if the device has no timestamps.
     runs: Vec<(Stage, Duration)>,
 }
 
@@ -23,7 +23,7 @@ struct Clock {
     resolved: wgpu::Buffer,
     /// The run that each pass of the current encoder belongs to.
     passes: Vec<usize>,
-    /// The same for all submissions, with the buffers of their timestamps.
+    /// For each submission, the runs of its passes and the buffer of timestamps.
     logs: Vec<(Vec<usize>, wgpu::Buffer)>,
 }
 
@@ -48,7 +48,7 @@ impl Timer {
         Ok(Self { clock, began: None, runs: Vec::new() })
     }
 
-    /// Whether the host measures a run, which has to be waited for.
+    /// Whether the host measures a run and must wait for it.
     pub(super) fn waits(&self) -> bool {
         self.began.is_some()
     }
@@ -58,7 +58,7 @@ impl Timer {
         self.clock.is_some()
     }
 
-    /// Begins a run of `stage`. Where the host measures and has not seen the end of the last run, it is a part of that.
+    /// Starts a run of `stage`. If the host still measures the last run, the new one becomes part of it.
     pub(super) fn begin(&mut self, stage: Stage) {
         if self.began.is_none() {
             self.runs.push((stage, Duration::ZERO));
@@ -73,7 +73,7 @@ impl Timer {
         }
     }
 
-    /// Where the next pass writes its begin and end.
+    /// Timestamp queries for the start and end of the next pass.
     pub(super) fn pass(&mut self) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
         let clock = self.clock.as_mut()?;
         let first = 2 * clock.passes.len() as u32;
@@ -97,7 +97,7 @@ impl Timer {
         Ok(())
     }
 
-    /// Every run so far and its time. Everything must have been submitted.
+    /// All runs so far with their times. Everything must have been submitted.
     pub(super) async fn times(&mut self, device: &mut Device) -> Result<Vec<(Stage, Duration)>> {
         if let (Some(clock), Some(tick)) = (&mut self.clock, device.tick) {
             for (passes, log) in clock.logs.drain(..) {

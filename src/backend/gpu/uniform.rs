@@ -1,5 +1,5 @@
-//! The parameters of a kernel: one uniform buffer per dispatch. All begin with the same header; the rest
-//! belongs to the stage.
+//! The parameters of a kernel: one uniform buffer per dispatch. All start with the same header; the rest
+//! depends on the stage.
 
 use crate::plan::{LABEL_BLOCK, LevelPlan, Plan, ROW_ALIGN};
 use bytemuck::Pod;
@@ -7,7 +7,7 @@ use bytemuck::Pod;
 /// Rows of every buffer start at a multiple of this many 32-bit words.
 pub(super) const ALIGN_WORDS: usize = ROW_ALIGN / 4;
 
-/// Declares a struct that a shader reads, with the names and offsets of its fields for the tests that compare both.
+/// Declares a struct that a shader reads, with the names and offsets of its fields for tests that compare both.
 macro_rules! layout {
     ($(#[$about:meta])* $name:ident { $( $field:ident: $type:ty ),* $(,)? }) => {
         $(#[$about])*
@@ -26,7 +26,7 @@ macro_rules! layout {
 
 pub(super) use layout;
 
-/// Names and offsets of the fields of a struct, in bytes.
+/// A struct with names and byte offsets of its fields.
 pub(super) trait Layout: Pod {
     /// Every field.
     const FIELDS: &'static [(&'static str, usize)];
@@ -71,7 +71,7 @@ impl LevelParams {
     }
 }
 
-/// Elements in a row of a map at full size.
+/// Elements per row of a map at full size.
 pub(super) fn full_pitch(plan: &Plan) -> u32 {
     (2 * plan.levels[0].width).next_multiple_of(ALIGN_WORDS) as u32
 }
@@ -125,7 +125,7 @@ impl UniformLayout {
     }
 }
 
-/// The bytes of a uniform, of which the stage's `own` are these.
+/// The bytes of a uniform with this header and the stage's `own` bytes.
 pub(super) fn bytes(header: &Header, own: &[u8]) -> Vec<u8> {
     let mut bytes = [bytemuck::bytes_of(header), own].concat();
     bytes.resize(bytes.len().next_multiple_of(16), 0);

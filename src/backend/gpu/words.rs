@@ -1,12 +1,12 @@
-//! Images, label ranges and label windows in words, as the shaders read them. Rows of images are made at once: on a GPU little else takes
-//! time.
+//! Images, label ranges and label windows as words for shaders. Rows of images are converted in parallel,
+//! since this takes a large share of the host's time.
 
 use super::uniform::LevelParams;
 use crate::image::{Image, Pixel, Plane};
 use crate::threads::prelude::*;
 
-/// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, to `words`, as long as that says all: as long as they are
-/// in whole 8-bit levels, and grey follows from colour. Returns whether it does.
+/// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, to `words`. Returns false if that
+/// loses information: if pixels are not in whole 8-bit levels, or grey does not follow from colour.
 pub(super) fn narrow_words(image: &Image, pitch: u32, words: &mut [u32]) -> bool {
     words
         .par_chunks_exact_mut(pitch as usize)
@@ -20,7 +20,7 @@ fn narrow_row_on<S: pulp::Simd>(_: S, pixels: &[Pixel], masked: &[bool], words: 
     let mut missed = 0;
     for ((word, pixel), &masked) in words.iter_mut().zip(pixels).zip(masked) {
         let [r, g, b, grey] = pixel.map(u32::from);
-        // The grey of the colour, times 1000 and before it is rounded down.
+        // 1000 times (the grey of the colour before rounding down, minus grey); below 1000 if they match.
         let above = (299 * r + 587 * g + 114 * b + 500).wrapping_sub(1000 * grey);
         missed |= (r | g | b) & 0xff | u32::from(above >= 1000);
         *word = r >> 8 | g | b << 8 | u32::from(masked) << 24;
@@ -28,7 +28,7 @@ fn narrow_row_on<S: pulp::Simd>(_: S, pixels: &[Pixel], masked: &[bool], words: 
     missed == 0
 }
 
-/// Pixels as the stages read them: red | green << 16, blue | grey << 16, 1 if masked, 0.
+/// Pixels for shaders: red | green << 16, blue | grey << 16, 1 if masked, 0.
 pub(super) fn image_words(image: &Image, pitch: u32) -> Vec<u32> {
     let pitch = 4 * pitch as usize;
     let mut words = vec![0; pitch * image.height()];
@@ -42,7 +42,7 @@ pub(super) fn image_words(image: &Image, pitch: u32) -> Vec<u32> {
     words
 }
 
-/// Pixels of a full size as the stages read them: red | green << 8 | blue << 16, each in 8 bits and rounded down, | 1 << 24 if
+/// Full-size pixels for shaders: red | green << 8 | blue << 16, each rounded down to 8 bits, | 1 << 24 if
 /// masked; grey.
 pub(super) fn full_words(image: &Image, pitch: u32) -> Vec<u32> {
     let pitch = 2 * pitch as usize;
@@ -57,7 +57,7 @@ pub(super) fn full_words(image: &Image, pitch: u32) -> Vec<u32> {
     words
 }
 
-/// First and last label of each pixel, first | last << 16.
+/// First and last label of each pixel as first | last << 16.
 pub(super) fn label_range_words(label_ranges: &Plane<[u16; 2]>, params: &LevelParams) -> Vec<u32> {
     let pitch = params.pixel_pitch as usize;
     let mut words = vec![0; pitch * label_ranges.height()];
@@ -69,7 +69,7 @@ pub(super) fn label_range_words(label_ranges: &Plane<[u16; 2]>, params: &LevelPa
     words
 }
 
-/// Label windows, first label | number of labels with padding << 16.
+/// Label windows as first label | number of labels with padding << 16.
 pub(super) fn window_words(windows: &Plane<[u16; 2]>) -> Vec<u32> {
     windows.data().iter().map(|&[first, count]| u32::from(first) | u32::from(count) << 16).collect()
 }

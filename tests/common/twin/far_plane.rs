@@ -24,7 +24,7 @@ struct Moments {
 /// A plane through the moments: its value, its slopes, and whether it is trusted.
 type Fit = Option<(i64, [i64; 2], bool)>;
 
-/// Filled pixels and unsure measured ones far from their plane take planes through measured pixels.
+/// Filled pixels, and unsure measured ones far from their plane, take planes through measured pixels.
 pub fn far_plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let refinement = &plan.method.refinement;
     let half = plan.method.schedule.match_size == MatchSize::Half;
@@ -141,7 +141,7 @@ fn own(maps: &Finest, patch: Patch, fit: &Fit) -> Moments {
     Moments { weight: (s + 4) / 8, mean, pairs }
 }
 
-/// The sum of a line of patches at patch `i`, with the `shares` that pass each step.
+/// The sum of a line of patches at patch `i`, with the `shares` that remain after each step.
 fn sum(line: Vec<Moments>, axis: usize, shares: &[i64], i: usize) -> Moments {
     let ahead = (0..i).fold(line[0], |sum, i| and(line[i + 1], carried(sum, axis, -4096, shares[i])));
     let behind = (i + 1..line.len()).rev();

@@ -30,7 +30,7 @@ pub fn fill(plan: &Plan, maps: &mut Finest) {
             if valid(x, y) || old_flags[(x, y)] & i32::from(flag::MASKED) != 0 {
                 continue;
             }
-            // Rows by distance, the upper one first on a tie.
+            // Rows by distance, the upper one first on ties.
             let value = (0..height)
                 .flat_map(|step| [y.checked_sub(step), Some(y + step)])
                 .flatten()

@@ -4,8 +4,8 @@ use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::Plan;
 use std::ops::Range;
 
-/// New dependency messages of `level` and the beliefs that follow from them, from the old messages and
-/// beliefs; `others` are the evidence and the messages from the coarser and the finer level.
+/// New dependency messages of `level`, and the new beliefs, from the old messages and beliefs; `others` are
+/// the evidence and the messages from the coarser and the finer level.
 pub fn flood(
     plan: &Plan,
     level: usize,

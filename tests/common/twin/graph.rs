@@ -2,7 +2,7 @@ use super::binomial;
 use mrfgs::image::{Image, Plane};
 use mrfgs::low_level::plan::Plan;
 
-/// Codes of the neighbours of every factor of every level, as `LevelGraph` holds them.
+/// Codes of the neighbours of every factor of every level, in the layout of `LevelGraph`.
 pub fn graphs(image: &Image, plan: &Plan) -> Vec<Vec<u8>> {
     let mut level = image.clone();
     let mut out = Vec::new();
@@ -34,7 +34,7 @@ fn codes(image: &Image, plan: &Plan) -> Vec<u8> {
     let mut out = Vec::new();
     for y in 0..height {
         for x in 0..width {
-            // (exponent, squared distance, code): the keys by which neighbours are sorted.
+            // (exponent, squared distance, code): the sort keys of neighbours.
             let mut around = Vec::new();
             for code in 0..49 {
                 let (dx, dy) = (code % 7 - 3, code / 7 - 3);

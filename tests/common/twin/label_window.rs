@@ -55,7 +55,7 @@ pub fn label_window(
     })
 }
 
-/// The labels of every pixel of `level`.
+/// The labels that every pixel of `level` has.
 pub fn ranges(plan: &Plan, level: usize, windows: &Plane<[u16; 2]>) -> Vec<Range<usize>> {
     let l = &plan.levels[level];
     let of = |i: usize| {

@@ -5,13 +5,13 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::Median;
 
-/// The weight that distance subtracts from a pixel at (dx, dy).
+/// Weight subtracted for the distance of a pixel at (dx, dy).
 pub fn space(dx: i64, dy: i64, sigma_space: f64) -> i64 {
     let e = (dx * dx + dy * dy) as f64 / (2.0 * sigma_space * sigma_space);
     (96.0 * (1.0 - (-e).exp())).round() as i64
 }
 
-/// The weight that the difference of two colours subtracts.
+/// Weight subtracted for the difference of two colours.
 pub fn colour(a: [u16; 4], b: [u16; 4], sigma_range: f64) -> i64 {
     // The slope, as a number up to 1 and a number of doublings.
     let slope = 0.1 / sigma_range;
@@ -48,7 +48,7 @@ fn known(validity: i32) -> bool {
 pub struct Window {
     pub radius: i64,
     pub step: (i64, i64),
-    /// Whether only every second place counts, as on a checkerboard.
+    /// Whether only every second place counts, in a checkerboard.
     pub checkered: bool,
     /// In places.
     pub sigma_space: f64,
@@ -69,7 +69,7 @@ impl Window {
     }
 }
 
-/// A place of a window that has a disparity.
+/// A place of a window, with a disparity.
 pub struct Place {
     /// Its offset from the middle, in places.
     pub step: (i64, i64),
@@ -77,7 +77,7 @@ pub struct Place {
     pub weight: i64,
 }
 
-/// The places of the window of pixel (x, y): every second row of it.
+/// The places of the window of pixel (x, y), in every second row.
 pub fn places(
     plan: &Plan,
     pair: &Pair,

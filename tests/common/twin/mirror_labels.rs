@@ -1,6 +1,6 @@
 use super::Finest;
 
-/// Copies the labels of the left view, mirrored, to the right one.
+/// Copies the mirrored labels of the left view to the right view.
 pub fn mirror_labels(maps: &mut Finest) {
     let (width, height) = maps.label.size();
     for y in 0..height {

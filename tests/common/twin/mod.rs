@@ -1,8 +1,9 @@
-//! A naive twin of every stage, one file per stage, written only from the definitions in
-//! `src/backend/stage.rs`: one cell at a time, wide integers, no padding, no tables, no tricks. It shares
-//! data types and documented constants with the library, but no function that computes.
+//! A naive twin of every stage, one file per stage, written only from the definitions in `src/stage/NAME.rs`:
+//! one cell at a time, wide integers, no padding, no tables, no tricks. Twins share data types and documented
+//! constants with the library, but no function that computes.
 //!
-//! Volumes are `Vec<u32>` in the layout of [`mrfgs::low_level::backend::probe::Volume`]: \[y\]\[x\]\[slot\]\[label\].
+//! Volumes are `Vec<u32>` in the layout of [`mrfgs::low_level::backend::probe::Volume`]:
+//! \[y\]\[x\]\[slot\]\[label\].
 
 pub mod census;
 
@@ -85,7 +86,7 @@ pub fn binomial(place: i64) -> i64 {
     }
 }
 
-/// The largest value of messages and beliefs, at which their sums saturate; it also means "no label agrees".
+/// The largest value of messages and beliefs, at which their sums saturate; also the sum if no label agrees.
 pub fn most(plan: &Plan) -> u32 {
     match plan.volume_width {
         VolumeWidth::Narrow => 255,
@@ -93,10 +94,10 @@ pub fn most(plan: &Plan) -> u32 {
     }
 }
 
-/// An undefined value: that of a label that a pixel does not have.
+/// Marks values of labels that a pixel does not have.
 pub const UNDEFINED: u32 = u32::MAX;
 
-/// Truncates the sums `s` to a message; the smallest is taken over the labels that `counts` accepts.
+/// Truncates the sums `s` to a message; the minimum is over the labels that `counts` accepts.
 pub fn cut(plan: &Plan, s: &[i64], counts: impl Fn(usize) -> bool, cut: Truncation) -> Vec<u32> {
     let (tau, infinite) = (i64::from(cut.tau), i64::from(most(plan)));
     let smallest = (0..s.len()).filter(|&d| counts(d)).map(|d| s[d]).min().unwrap_or(infinite);
@@ -110,7 +111,7 @@ pub fn cut(plan: &Plan, s: &[i64], counts: impl Fn(usize) -> bool, cut: Truncati
 }
 
 /// The message of a variable to a factor: its belief minus the factor's old message, infinite where the
-/// belief is and, if truncation is absolute, minus its minimum over the labels that `counts` accepts.
+/// belief is. For absolute truncation, also minus its minimum over the labels that `counts` accepts.
 pub fn variable_message(
     plan: &Plan,
     belief: &[u32],

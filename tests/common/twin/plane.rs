@@ -8,7 +8,7 @@ fn fits(value: i64) -> i64 {
     i32::try_from(value).expect("a number that fits in 32 bits").into()
 }
 
-/// The median, and then the value of a plane through the same disparities.
+/// The median, then the value of a plane fitted to the same disparities.
 pub fn plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let window = Window { checkered: true, ..Window::of(plan) };
     through(plan, pair, maps, &window, |validity| changes(plan, validity));

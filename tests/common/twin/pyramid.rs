@@ -2,7 +2,7 @@ use super::binomial;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::Pyramid;
 
-/// Cost of `level` from that of the next finer one.
+/// Cost of `level` from the next finer one.
 pub fn pyramid(plan: &Plan, level: usize, fine: &[u32]) -> Vec<u32> {
     let (f, c) = (&plan.levels[level - 1], &plan.levels[level]);
     let (width, height) = (f.width as i64, f.height as i64);

@@ -1,6 +1,6 @@
 use super::Finest;
 
-/// Exchanges the labels of the two views, mirrored.
+/// Exchanges and mirrors the labels of the two views.
 pub fn swap_views(maps: &mut Finest) {
     let old = maps.clone();
     let (width, height) = old.label.size();

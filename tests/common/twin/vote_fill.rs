@@ -12,7 +12,7 @@ use mrfgs::options::{Fill, Nearer};
 /// A half-size pixel: column and row.
 type Half = (usize, usize);
 
-/// The votes of half-size pixels on the maps before the stage.
+/// The votes of half-size pixels on the maps from before the stage.
 struct Votes<'a> {
     plan: &'a Plan,
     pair: &'a Pair,
@@ -109,7 +109,7 @@ impl Votes<'_> {
         }
     }
 
-    /// Column of the right view that label `k` of column `x` leads to.
+    /// Column of the right view to which label `k` of column `x` projects.
     fn column(&self, k: usize, x: usize) -> Option<usize> {
         let column = usize::try_from(x as i64 - i64::from(self.plan.range.min) - k as i64);
         column.ok().filter(|&column| column < self.pair.size().0)
@@ -128,13 +128,13 @@ impl Votes<'_> {
         shown
     }
 
-    /// Whether label `k` at (x, y) would hide a pixel that the right view sees.
+    /// Whether label `k` at (x, y) would hide a label in the right view.
     fn hides(&self, k: usize, x: usize, y: usize) -> bool {
         let seen = self.column(k, x).and_then(|column| self.shown[y][column]);
         seen.is_some_and(|label| self.nearer(k, label, HIDING_LABELS as usize))
     }
 
-    /// Own votes of a half-size pixel, by label.
+    /// Votes of one half-size pixel, by label.
     fn own(&self, (x, y): Half) -> Vec<u64> {
         let (width, height) = self.pair.size();
         let of = |k: usize| {

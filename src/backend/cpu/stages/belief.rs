@@ -3,7 +3,7 @@
 use super::dependency::{REACH, touch};
 use crate::backend::cpu::units::{Blocks, Units, block, block_mut, each_lane, padding};
 use crate::backend::cpu::volumes::{Level, Volumes};
-use crate::backend::cpu::windows::{Seen, Window, Windows};
+use crate::backend::cpu::windows::{AlignedCells, Window, Windows};
 use crate::graph::{Incoming, LevelGraph};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan};
 use crate::program::Sent;
@@ -15,9 +15,9 @@ pub(super) struct Summands<'a, U> {
     pub(super) graph: &'a LevelGraph,
     pub(super) windows: &'a Windows,
     evidence: &'a [u8],
-    /// Empty where the coarser level has sent no messages yet.
+    /// Empty if the coarser level has sent no messages yet.
     down: &'a [U],
-    /// Empty where the finer level has sent no messages yet.
+    /// Empty if the finer level has sent no messages yet.
     up: &'a [U],
     most: U,
     /// The message of a dependency factor at labels that its own pixel does not have.
@@ -26,7 +26,7 @@ pub(super) struct Summands<'a, U> {
 }
 
 impl<'a, U: Units> Summands<'a, U> {
-    /// The terms of level `z`, with its dependency messages and its beliefs.
+    /// The terms of level `z`, its dependency messages, and its beliefs.
     pub(super) fn of(
         plan: &Plan,
         levels: &'a mut [Level<U>],
@@ -39,7 +39,7 @@ impl<'a, U: Units> Summands<'a, U> {
             graph,
             windows,
             evidence,
-            // A volume without messages is left out of the sum.
+            // Volumes without messages are left out of the sum.
             down: if sent.above { down } else { &[] },
             up: if sent.below { up } else { &[] },
             most: U::of(plan.belief_most().into()),
@@ -50,8 +50,7 @@ impl<'a, U: Units> Summands<'a, U> {
     }
 }
 
-/// The beliefs of row `y`, from the dependency messages of the factors, `dependency` being those from the cell `first` on.
-/// `None` means that the factors have not sent any yet.
+/// The beliefs of row `y`; `dependency` has messages from cell `first` on, or is `None` if none were sent.
 #[pulp::with_simd(row = crate::vectors::widest())]
 #[inline(always)]
 pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
@@ -70,12 +69,12 @@ pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
         *start *= graph.slots();
     }
     if let Some(dependency) = dependency {
-        // The lowest of the rows that the factors of this row's pixels are on: the others were needed before.
+        // The lowest row with factors that hold pixels of this row; the rows above are already cached.
         let lowest = (y + REACH).min(windows.height() - 1);
         let start = windows.start(lowest) - first;
         touch(&dependency[graph.slots() * start..][..graph.slots() * windows.length(lowest)]);
     }
-    // Where the messages of the factors that hold a pixel start.
+    // Start indices of the messages of the factors that hold a pixel.
     let mut messages = [0; GRAPH_WINDOW * GRAPH_WINDOW];
     for (x, &window) in windows.row(y).iter().enumerate() {
         let own = window.cells();
@@ -113,7 +112,7 @@ pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
     }
 }
 
-/// The beliefs of these rows.
+/// The beliefs of `rows`.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows: Range<usize>) {
     let (summands, [dependency, belief]) = Summands::of(&v.plan, &mut v.levels, level, sent);
     let dependency = sent.dependency.then_some(&*dependency);
@@ -121,7 +120,7 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows:
     beliefs.zip(rows).for_each(|(belief, y)| row(&summands, y, 0, dependency, belief));
 }
 
-/// A pixel's belief, and its terms.
+/// The belief of a pixel, and its terms.
 struct Sum<'a, U> {
     summands: &'a Summands<'a, U>,
     window: Window,
@@ -129,7 +128,7 @@ struct Sum<'a, U> {
     down: Option<&'a [U]>,
     up: Option<&'a [U]>,
     dependency: &'a [U],
-    /// Where in `dependency` the message of each factor that holds the pixel starts.
+    /// Start indices in `dependency` of the messages of the factors that hold the pixel.
     messages: &'a [usize],
     belief: &'a mut [U],
 }
@@ -155,13 +154,13 @@ impl<U: Units> Sum<'_, U> {
         *block_mut(self.belief, at) = each_lane::<U, N>(|i| sum[i].min(*most) | padding[i]);
     }
 
-    /// The block of labels at `at`, from factors whose windows differ.
+    /// The block of labels at `at`, from factors with other windows than the pixel's.
     #[inline(always)]
     fn block_in_window(&mut self, at: usize, factors: impl Iterator<Item = Window>) {
         let Summands { windows, tau, .. } = self.summands;
         let mut sum: [U; LABEL_BLOCK] = self.own_terms(at);
         for (window, &start) in factors.zip(self.messages) {
-            let seen = Seen::new(windows, window, self.dependency, start, self.window.first());
+            let seen = AlignedCells::new(windows, window, self.dependency, start, self.window.first());
             let (m, outside) = seen.block(at);
             sum = plus(sum, &each_lane(|i| m[i] & !outside[i] | *tau & outside[i]));
         }

@@ -13,7 +13,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
     v.change = Some(sum);
 }
 
-/// The labels of a row, and the sum of their squared changes.
+/// Writes the labels of a row; returns the sum of their squared changes.
 #[pulp::with_simd(label_row = crate::vectors::widest())]
 #[inline(always)]
 fn label_row_on<'a, S: pulp::Simd, U: Units>(
@@ -24,7 +24,7 @@ fn label_row_on<'a, S: pulp::Simd, U: Units>(
 ) -> u64 {
     let mut sum = 0;
     for (label, window) in labels.iter_mut().zip(windows) {
-        // The belief of padding is the largest value, and behind all labels.
+        // The belief of padding is the largest value, and comes after all labels.
         let new = (window.first() + argmin(&belief[window.cells()]).0) as u16;
         sum += u64::from(new.abs_diff(*label)).pow(2);
         *label = new;

@@ -1,4 +1,4 @@
-//! The confidence of each pixel by itself: see [`crate::backend::Stage::Confidence`].
+//! The lead of each pixel's label: see [`crate::backend::Stage::Confidence`].
 
 use crate::image::Pair;
 use crate::maps::flag;
@@ -6,7 +6,7 @@ use crate::plan::Plan;
 use crate::stage::MapSet;
 use crate::threads::prelude::*;
 
-/// Pixels that are worth a thread.
+/// Minimum number of pixels per thread.
 const LEAST: usize = 1 << 14;
 
 pub(super) fn run(maps: &mut MapSet, _: &Plan, _: &Pair) {

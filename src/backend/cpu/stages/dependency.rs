@@ -1,14 +1,14 @@
 //! Messages of the dependency factors: see [`crate::backend::Stage::Dependency`].
 //!
 //! A factor reads old beliefs and its own old messages and writes only its own messages, so flooding in place
-//! is exact. The messages to all members are stored for the labels of the factor's own pixel: at all others its
-//! belief is infinite, and the message is tau.
+//! is exact. Messages are stored for the labels of the factor's own pixel only: at all others its belief is
+//! infinite, and the message is tau.
 
 use crate::backend::cpu::units::{
     Least, Units, block, block_mut, bounds, cut_block, each_lane, keep_least, smallest, truncate,
 };
 use crate::backend::cpu::volumes::{Level, Volumes};
-use crate::backend::cpu::windows::{Seen, Window, Windows};
+use crate::backend::cpu::windows::{AlignedCells, Window, Windows};
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Truncation, TruncationRule};
 use crate::program::Sent;
@@ -18,16 +18,16 @@ use std::ops::Range;
 
 /// Working memory of a thread.
 pub(super) struct Scratch<U> {
-    /// q of each member, \[member\]\[label\]; `after` has the sum of q over the members after it.
+    /// q of each member, \[member\]\[label\]; `after` has the sums of q over later members.
     q: Vec<U>,
     after: Vec<U>,
-    /// The largest value where the member does not have the label, else 0.
+    /// The largest value at labels that the member does not have, else 0.
     outside: Vec<U>,
-    /// Sum of q over the members before.
+    /// Sum of q over earlier members.
     before: Vec<U>,
-    /// Sums of q over the other members: of each of three members, with one value more at either end.
+    /// Sums of q over the other members, for each of three members, with one extra value at either end.
     sums: Vec<U>,
-    /// Slots of the members.
+    /// The occupied slots.
     slots: Vec<usize>,
 }
 
@@ -60,7 +60,7 @@ pub(super) struct Factors<'a> {
     pub(super) step: Option<u16>,
 }
 
-/// The messages of the factors of these rows.
+/// The messages of the factors of `rows`.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows: Range<usize>) {
     let (plan, l) = (&v.plan, &v.plan.levels[level]);
     let Level { graph, windows, belief, dependency: messages, .. } = &mut v.levels[level];
@@ -110,7 +110,7 @@ pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
         match *graph.neighbours_of(x, y) {
             [a, b] if b != NO_MEMBER && a != NO_MEMBER && cut.rule == TruncationRule::Relative => {
                 let (a, b) = (near.window(place(a)), near.window(place(b)));
-                // One by one: mapped, they would be copied through memory.
+                // Listed one by one, because `map` would copy them through memory.
                 let members = [
                     near.seen((window, around[REACH]), window.first()),
                     near.seen(a, window.first()),
@@ -140,7 +140,7 @@ pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
     }
 }
 
-/// The pixels around those of a row.
+/// The neighbourhood of a row's pixels.
 struct Near<'a, U> {
     windows: &'a Windows,
     rows: [&'a [Window]; GRAPH_WINDOW],
@@ -148,21 +148,20 @@ struct Near<'a, U> {
 }
 
 impl<'a, U: Units> Near<'a, U> {
-    /// The window of the pixel in column `x` of a row, and the beliefs of that row.
+    /// The window of the pixel in column `x` of a row, and the beliefs of the row.
     #[inline(always)]
     fn window(&self, (x, row): (usize, usize)) -> (Window, &'a [U]) {
         (self.rows[row][x], self.around[row])
     }
 
-    /// The beliefs of that pixel, for labels counted from `first`.
+    /// The beliefs of a pixel, with labels counted from `first`.
     #[inline(always)]
-    fn seen(&self, (window, beliefs): (Window, &'a [U]), first: usize) -> Seen<'a, U> {
-        Seen::new(self.windows, window, beliefs, window.start(), first)
+    fn seen(&self, (window, beliefs): (Window, &'a [U]), first: usize) -> AlignedCells<'a, U> {
+        AlignedCells::new(self.windows, window, beliefs, window.start(), first)
     }
 }
 
-/// Brings a row into the cache in sequential order, which the prefetcher predicts. It cannot predict the
-/// order in which factors access the row.
+/// Brings a row into the cache sequentially, which prefetchers predict, unlike the accesses of factors.
 pub(super) fn touch<U: Units>(row: &[U]) {
     const CACHE_LINE: usize = 64;
     let step = CACHE_LINE / size_of::<U>();
@@ -172,15 +171,15 @@ pub(super) fn touch<U: Units>(row: &[U]) {
 /// A block of labels.
 type Block<U> = [U; LABEL_BLOCK];
 
-/// A factor of three members. Each sum has two terms.
+/// A factor with three members, where each sum has two terms.
 struct Three<'a, U> {
-    members: [Seen<'a, U>; 3],
+    members: [AlignedCells<'a, U>; 3],
     stride: usize,
 }
 
 impl<U: Units> Three<'_, U> {
-    /// The sums for each member at the block of labels at `at`, and again with infinite ones where the member does not
-    /// have the label. `SAME` where all members have the same labels.
+    /// The sums for each member at the block of labels at `at`, and the sums made infinite at labels that the
+    /// member does not have. `SAME` if all members have the same labels.
     #[inline(always)]
     fn sums<const SAME: bool>(&self, messages: &[U], at: usize) -> ([Block<U>; 3], [Block<U>; 3]) {
         let [(q0, out0), (q1, out1), (q2, out2)] = [
@@ -239,7 +238,7 @@ impl<U: Units> Three<'_, U> {
         }
     }
 
-    /// The same where labels that differ by one cost `step`.
+    /// Like `send`, with the cost `step` for labels that differ by one.
     #[inline(always)]
     fn send_near<const SAME: bool>(&self, cut: Truncation, step: u16, messages: &mut [U], scratch: &mut [U]) {
         let (stride, whole) = (self.stride, self.stride + 2);
@@ -259,8 +258,8 @@ impl<U: Units> Three<'_, U> {
     }
 }
 
-/// Truncates sums to a message where labels that differ by one cost `step`. `sums` has the largest value before and after the labels,
-/// and at those that no pixel has.
+/// Truncates sums to a message, with the cost `step` for labels that differ by one. `sums` has the largest
+/// value before and after the labels, and at labels that no pixel has.
 #[inline(always)]
 fn truncate_near<U: Units>(sums: &[U], least: Least<U>, cut: Truncation, step: u16, out: &mut [U]) {
     let (low, high) = bounds(least, cut);
@@ -283,12 +282,12 @@ fn or<U: Units>(a: &Block<U>, b: &Block<U>) -> Block<U> {
     each_lane(|i| a[i] | b[i])
 }
 
-/// The messages of a factor of any number of members.
+/// The messages of a factor with any number of members.
 fn any<'a, U: Units>(
     cut: Truncation,
     step: Option<u16>,
     stride: usize,
-    member: impl Fn(usize) -> Seen<'a, U>,
+    member: impl Fn(usize) -> AlignedCells<'a, U>,
     messages: &mut [U],
     scratch: &mut Scratch<U>,
 ) {
@@ -309,8 +308,7 @@ fn any<'a, U: Units>(
             }
         }
     }
-    // Saturated sums cannot be undone by subtraction, so the sums of the members before and after are added
-    // instead.
+    // Saturated sums cannot be undone by subtraction, so the sums of earlier and later members are added.
     let last = (slots.len() - 1) * stride;
     after[last..][..stride].fill(U::default());
     for at in (0..last).step_by(stride).rev() {

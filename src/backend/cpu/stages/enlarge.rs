@@ -1,6 +1,6 @@
-//! The maps at full size: see [`crate::backend::Stage::Enlarge`].
+//! Upsampled maps: see [`crate::backend::Stage::Enlarge`].
 //!
-//! Most pixels are far from every edge, and interpolate. The others look at the 3 x 3 half-size pixels around them.
+//! Most pixels are far from edges and are interpolated. Only the others examine their neighbourhood.
 
 use crate::backend::cpu::units::each_lane;
 use crate::image::{Image, Pair, Pixel, Plane};
@@ -19,7 +19,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     let half = Half { low, above_low, validity, confidence, colours: &pair.left().pixels };
     let (width, any_masked) = (half.above_low.width(), image.any_masked());
     let Maps { disparity, raw: full_raw, confidence: full_confidence, validity: full_validity, .. } = full;
-    // Two rows of the full size for one of half of it.
+    // Two full-size rows per half-size row.
     let maps =
         disparity.data_mut().par_chunks_mut(4 * width).zip(full_raw.data_mut().par_chunks_mut(4 * width));
     let flags = full_confidence
@@ -41,7 +41,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     });
 }
 
-/// The two rows of the full size of row `y`, where it is not `plain`.
+/// The pixels of the two full-size rows of row `y` that are not `plain`.
 #[pulp::with_simd(edges_row = crate::vectors::widest())]
 #[inline(always)]
 fn edges_row_on<'a, S: pulp::Simd>(
@@ -81,9 +81,9 @@ fn twice<T: Copy, U: Copy>(row: &[T], out: &mut [U], value: impl Fn(T) -> U) {
     below.copy_from_slice(above);
 }
 
-/// The maps at half the size.
+/// The maps at half size.
 struct Half<'a> {
-    /// The smallest disparity of the full size, and how far the others are above it: sums of those fit 32 bits.
+    /// The smallest disparity at full size; others are relative to it, so that sums fit in 32 bits.
     low: i32,
     above_low: Plane<i32>,
     validity: &'a Plane<u8>,
@@ -96,12 +96,12 @@ struct Scratch {
     low: Vec<i32>,
     high: Vec<i32>,
     sums: Vec<i32>,
-    /// Pixels of the row around which there is no edge, and which has a disparity as all around it.
+    /// Pixels that are not near an edge, and have a disparity like all their neighbours.
     plain: Vec<bool>,
 }
 
 impl Half<'_> {
-    /// The 3 x 3 around a pixel; `None` where that has no disparity.
+    /// The 3 x 3 neighbourhood of a pixel; `None` if the pixel has no disparity.
     #[inline(always)]
     fn around(&self, (x, y): (usize, usize)) -> Option<Around> {
         if !has_disparity(self.validity[(x, y)]) {
@@ -129,7 +129,7 @@ impl Half<'_> {
         Some(around)
     }
 
-    /// Interpolates the two rows of the full size of row `y`, and finds where that is enough.
+    /// Interpolates the two full-size rows of row `y`, and finds the pixels for which that suffices.
     fn interpolate(&self, y: usize, scratch: &mut Scratch, out: &mut [i32]) {
         let (width, height) = self.above_low.size();
         let Scratch { low, high, sums, plain } = scratch;
@@ -151,33 +151,33 @@ impl Half<'_> {
     }
 }
 
-/// Lanes for the 3 x 3 pixels around one, in raster order.
+/// Lanes for a 3 x 3 neighbourhood in raster order.
 const LANES: usize = 16;
-/// How unlike is what is not known: more than all others, three channels and the distance.
+/// Dissimilarity of unknown pixels: more than three channels and the distance can give.
 const UNKNOWN: i16 = 3 * 255 + 8 * AWAY as i16 + 1;
 const _: () = assert!((UNKNOWN as i32 + 1) * LANES as i32 <= i16::MAX as i32);
 
-/// What is known of the 3 x 3 pixels around one of half the size.
+/// The 3 x 3 neighbourhood of a half-size pixel.
 #[derive(Default)]
 struct Around {
     own: (usize, usize),
-    /// Which columns, from 0 to 2, are to its left and right, clamped to the image, and the same of rows.
+    /// Columns (0 to 2) of the neighbours to the left and right, clamped to the image; then rows likewise.
     beside: [[usize; 2]; 2],
-    /// Whether they are inside and have a disparity.
+    /// Whether pixels are inside and have a disparity.
     known: [bool; LANES],
     above_low: [i32; LANES],
-    /// Whether these span at most a pixel of the full size.
+    /// Whether the known disparities span at most a full-size pixel.
     is_flat: bool,
     /// Red, green and blue in 8-bit levels.
     colours: [[i16; LANES]; 3],
 }
 
-/// What distance adds to how unlike each of the 3 x 3 pixels is, for a pixel in this column and row of the block.
+/// The distance terms of the dissimilarity, for a pixel in column i and row j of the block.
 const fn away((i, j): (usize, usize)) -> [i16; LANES] {
     let mut away = [0; LANES];
     let mut k = 0;
     while k < 9 {
-        // In halves of a pixel: 3, 1 and 5, or the other way round.
+        // In half pixels: 3, 1 and 5, or the reverse.
         let (x, y) = (4 * (k % 3) as i32 - 3 - 2 * i as i32, 4 * (k / 3) as i32 - 3 - 2 * j as i32);
         away[k] = (AWAY * (x.abs() + y.abs()) / 2) as i16;
         k += 1;
@@ -188,13 +188,13 @@ const fn away((i, j): (usize, usize)) -> [i16; LANES] {
 const DISTANCES: [[[i16; LANES]; 2]; 2] = [[away((0, 0)), away((0, 1))], [away((1, 0)), away((1, 1))]];
 
 impl Around {
-    /// How far the disparity of a pixel of the full size in the block, of this `colour`, is above the smallest, and the pixel of half
-    /// the size that it is most like.
+    /// The relative disparity of a full-size pixel of this `colour` in the block, and the half-size pixel
+    /// most similar to it.
     #[inline(always)]
     fn at(&self, (i, j): (usize, usize), colour: Pixel) -> (i32, (usize, usize)) {
         let Self { own, beside, known, above_low, is_flat, colours } = self;
         if *is_flat {
-            // Where it has no disparity, a pixel is that of the block.
+            // Pixels without a disparity are replaced by the centre.
             let value = |k: usize| above_low[if known[k] { k } else { 4 }];
             let (x, y) = (beside[0][i], 3 * beside[1][j]);
             return ((9 * value(4) + 3 * value(3 + x) + 3 * value(y + 1) + value(y + x) + 8) >> 4, *own);
@@ -205,7 +205,7 @@ impl Around {
                 (colours[0][k] - red).abs() + (colours[1][k] - green).abs() + (colours[2][k] - blue).abs();
             if known[k] { apart + DISTANCES[i][j][k] } else { UNKNOWN }
         });
-        // How unlike, and which, in one number.
+        // Dissimilarity and index in one number.
         let keys: [i16; LANES] = each_lane(|k| unlike[k] * LANES as i16 + k as i16);
         let least = keys.into_iter().fold(i16::MAX, i16::min) as usize;
         let (smallest, best) = ((least / LANES) as i16, least % LANES);
@@ -220,13 +220,13 @@ impl Around {
     }
 }
 
-/// The values that are known, and `other` for the others.
+/// The known values, with `other` in place of the rest.
 #[inline(always)]
 fn each_known(known: &[bool; LANES], values: &[i32; LANES], other: i32) -> [i32; LANES] {
     each_lane(|k| if known[k] { values[k] } else { other })
 }
 
-/// Where the disparities of 3 x 3 pixels span at most a pixel of the full size.
+/// Whether the disparities of each 3 x 3 neighbourhood span at most a full-size pixel.
 #[pulp::with_simd(flat_row = crate::vectors::widest())]
 #[inline(always)]
 fn flat_row_on<'a, S: pulp::Simd>(
@@ -253,7 +253,7 @@ fn flat_row_on<'a, S: pulp::Simd>(
     }
 }
 
-/// A row of the full size, between the row of half the size that it is in and the one beside that.
+/// Interpolates a full-size row between its half-size row and the neighbour of that.
 #[pulp::with_simd(between_row = crate::vectors::widest())]
 #[inline(always)]
 fn between_row_on<'a, S: pulp::Simd>(

@@ -9,7 +9,7 @@ use crate::program::Sent;
 use crate::threads::prelude::*;
 use std::ops::Range;
 
-/// The evidence of these rows.
+/// The evidence of `rows`.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, _: Sent, rows: Range<usize>) {
     let (plan, l) = (&v.plan.levels[level], &mut v.levels[level]);
     let windows = &l.windows;
@@ -35,20 +35,20 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, _: Sent, rows: Ra
 /// The costs of a row.
 #[derive(Clone, Copy)]
 enum Costs<'a, C> {
-    /// Of all labels.
+    /// Costs of all labels.
     OfAll(&'a [C]),
-    /// Of the labels of the windows, as a volume holds them.
+    /// Costs of the labels in the windows, in the layout of volumes.
     OfWindows(&'a [C]),
 }
 
 impl<'a, C> Costs<'a, C> {
-    /// Row `y` of a volume that holds the costs of all labels.
+    /// Row `y` of a volume with the costs of all labels.
     fn stored(volume: &'a [C], y: usize, level: &LevelPlan) -> Self {
         let cells = level.width * level.stride;
         Self::OfAll(&volume[y * cells..][..cells])
     }
 
-    /// Those of the pixel at column `x`, for the labels of its window.
+    /// The costs of the pixel at column `x` for the labels of its window.
     #[inline(always)]
     fn of(&self, x: usize, window: Window, level: &LevelPlan) -> &'a [C] {
         match self {
@@ -79,7 +79,7 @@ fn evidence_row_on<'a, S: pulp::Simd, C: StoredCost, U: Units>(
             *e = level.evidence.apply(c.fraction() - min);
             *b = (*e).into();
         }
-        // Padding must never look better than a label.
+        // Padding must never be better than a label.
         evidence[labels..].fill(u8::MAX);
         belief[labels..].fill(U::MOST);
     }

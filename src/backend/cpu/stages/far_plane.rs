@@ -1,4 +1,4 @@
-//! Planes carried over from far away: see [`crate::backend::Stage::FarPlane`].
+//! Extends planes over any distance: see [`crate::backend::Stage::FarPlane`].
 
 use super::plane::limits;
 use crate::backend::cpu::colours::{difference, mean_colours};
@@ -45,7 +45,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     });
 }
 
-/// What `of` gives for each patch.
+/// Computes `of` for each patch.
 fn by_patch<T: Copy + Default + Send>(
     (width, height): (usize, usize),
     of: impl Fn(usize, usize) -> T + Sync,
@@ -57,11 +57,11 @@ fn by_patch<T: Copy + Default + Send>(
     out
 }
 
-/// The weighted moments of measured pixels.
+/// Weighted moments of measured pixels.
 #[derive(Clone, Copy, Default)]
 struct Moments {
     weight: u32,
-    /// Their mean place, from the middle of a patch on.
+    /// Mean position, relative to the middle of a patch.
     mean: [i32; 2],
     disparity: i32,
     xx: i32,
@@ -72,7 +72,7 @@ struct Moments {
     dd: i32,
 }
 
-/// Those of the pixels of a patch, far from the plane of which they count less.
+/// The moments of the pixels of a patch; those far from the plane `fit` count less.
 fn own(maps: &MapSet, (x, y): (usize, usize), fit: Option<&Fit>) -> Moments {
     let MapSet { disparity, validity, confidence, .. } = maps;
     let (width, height) = disparity.size();
@@ -115,13 +115,13 @@ fn own(maps: &MapSet, (x, y): (usize, usize), fit: Option<&Fit>) -> Moments {
     }
 }
 
-/// How far a column or row is from the middle of its patch, in half pixels.
+/// Distance of a column or row from the middle of its patch, in half pixels.
 fn from_middle(at: usize) -> i32 {
     2 * (at % PATCH) as i32 - (PATCH as i32 - 1)
 }
 
 impl Moments {
-    /// These as seen from the next patch along an axis, where they weigh `share` / 256 as much.
+    /// The moments relative to the next patch along an axis, with `share` / 256 of their weight.
     #[inline(always)]
     fn carried(mut self, axis: usize, forward: bool, share: u32) -> Self {
         let step = 1024 * PATCH as i32;
@@ -131,7 +131,7 @@ impl Moments {
         self
     }
 
-    /// These and others together.
+    /// Merges two sets of moments.
     #[inline(always)]
     fn and(self, other: Self) -> Self {
         if other.weight == 0 {
@@ -166,7 +166,7 @@ impl Moments {
         }
     }
 
-    /// The plane through them, where they have enough weight.
+    /// The plane through the moments, if their weight suffices.
     fn fit(&self) -> Option<Fit> {
         if self.weight < PATCH_LEAST {
             return None;
@@ -188,7 +188,7 @@ impl Moments {
     }
 }
 
-/// The slopes along the axis with the larger moment and along the other one, in 1/8192.
+/// (slope along the axis p with the larger moment, slope along the other axis q), in 1/8192.
 fn slopes(pp: i32, pq: i32, qq: i32, pd: i32, qd: i32) -> (i32, i32) {
     let tilt = ((pq << 11) / pp).clamp(-2048, 2048);
     let q = (qq - ((tilt * pq) >> 11)).max(1);
@@ -203,18 +203,18 @@ fn product(slope: i32, moment: i32) -> i32 {
     2 * slope * (moment >> 10) + ((slope * (moment & 1023)) >> 9)
 }
 
-/// A plane.
+/// A plane through the measured pixels.
 #[derive(Clone, Copy)]
 struct Fit {
-    /// Whether filled pixels, and those in doubt, take it.
+    /// Whether filled and doubtful pixels take its value.
     trusted: bool,
-    /// In the middle of the patch, in 1/1024 px.
+    /// Value in the middle of the patch, in 1/1024 px.
     value: i32,
     slopes: [i32; 2],
 }
 
 impl Fit {
-    /// Its value at a pixel of the patch, in 1/256 px.
+    /// The value at a pixel of the patch, in 1/256 px.
     #[inline(always)]
     fn at(&self, x: usize, y: usize) -> i32 {
         let [a, b] = self.slopes;
@@ -222,7 +222,7 @@ impl Fit {
     }
 }
 
-/// The planes through what the patches have of their own and what reaches them.
+/// The planes through the patches' own moments and those that reach them.
 fn fit(own: &Plane<Moments>, colours: &Plane<[u8; 3]>, shares: &[u32]) -> Plane<Option<Fit>> {
     let (width, height) = own.size();
     let share = |a: (usize, usize), b: (usize, usize)| {
@@ -238,7 +238,7 @@ fn fit(own: &Plane<Moments>, colours: &Plane<[u8; 3]>, shares: &[u32]) -> Plane<
     rows.data_mut().par_chunks_mut(width).enumerate().for_each_init(Vec::new, |back, (y, row)| {
         carry(row, 0, |x| share((x - 1, y), (x, y)), back);
     });
-    // By columns.
+    // Transposed: column by column.
     let mut fits = Plane::filled(height, width, None);
     let columns = fits.data_mut().par_chunks_mut(height).enumerate();
     columns.for_each_init(Default::default, |(column, back): &mut (Vec<_>, _), (x, out)| {
@@ -250,8 +250,8 @@ fn fit(own: &Plane<Moments>, colours: &Plane<[u8; 3]>, shares: &[u32]) -> Plane<
     by_patch((width, height), |x, y| fits[(y, x)])
 }
 
-/// Sums moments along a line; `share` tells what is left of their weight after the step to place i from the one before. `back` is working
-/// memory.
+/// Sums moments along a line; `share(i)` is the remaining weight after the step to place i from the one
+/// before. `back` is scratch memory.
 fn carry(line: &mut [Moments], axis: usize, share: impl Fn(usize) -> u32, back: &mut Vec<Moments>) {
     back.clear();
     back.resize(line.len(), Moments::default());

@@ -39,7 +39,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
 fn fill_row(disparity: &[i32], flags: &[u8], farther: fn(i32, i32) -> i32) -> Vec<i32> {
     let is_valid = |flags: &u8| flags & flag::INVALID == 0;
     let mut filled = disparity.to_vec();
-    // Beyond the first and the last valid pixel there is one neighbour, which stands for both.
+    // Beyond the first and the last valid pixel, the only neighbour counts as both.
     let mut nearest = flags.iter().position(is_valid).map_or(0, |first| disparity[first]);
     for (value, flags) in filled.iter_mut().zip(flags) {
         nearest = if is_valid(flags) { *value } else { nearest };

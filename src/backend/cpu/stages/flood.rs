@@ -1,9 +1,8 @@
-//! Messages of the dependency factors and beliefs in one sweep: see [`crate::backend::Stage::Flood`].
+//! Dependency messages and beliefs in one sweep: see [`crate::backend::Stage::Flood`].
 //!
-//! A belief is summed as soon as the last factor that contains its pixel has sent its messages, three rows
-//! below. By then no factor needs the old belief any more, and the messages are still in the cache. Every
-//! thread sweeps a band of rows. Beliefs within three rows of the border between two bands wait until all
-//! bands are done.
+//! A belief is summed as soon as the last factor that contains its pixel, three rows below, has sent its
+//! messages. By then no factor needs the old belief, and the messages are still in the cache. Every thread
+//! sweeps a band of rows; beliefs within three rows of a border between bands wait until all bands are done.
 
 use super::belief::{self, Summands};
 use super::dependency::{self, Around, Factors, REACH, Scratch};
@@ -19,9 +18,9 @@ const BANDS: usize = 4;
 /// Smallest number of rows of a band.
 const LEAST_ROWS: usize = 4 * REACH;
 
-/// A band of rows, with the beliefs that no other band changes.
+/// A band of rows, with the beliefs that no other band accesses.
 struct Band<'a, U> {
-    /// Rows of its factors, and of its own beliefs.
+    /// Rows of its factors, and rows of its own beliefs.
     rows: Range<usize>,
     rows_own: Range<usize>,
     messages: &'a mut [U],
@@ -38,13 +37,12 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let slots = summands.graph.slots();
     let threads = current_num_threads();
     let most = (BANDS * threads).min(height / LEAST_ROWS).max(1);
-    // As many for each thread.
+    // The same number of bands for each thread.
     let count = if most > threads { most / threads * threads } else { most };
     let starts: Vec<usize> = (0..=count).map(|i| i * height / count).collect();
     let cells = |rows: Range<usize>| rows.map(|y| windows.length(y)).sum::<usize>();
 
-    // The beliefs alternate: those of one band alone, then those around the border to the next band, and so
-    // on.
+    // Beliefs alternate: those of one band alone, those around the border to the next band, and so on.
     let (mut own, mut edges) = (Vec::new(), Vec::new());
     let mut rest = &mut *belief;
     let mut row = 0;
@@ -87,8 +85,8 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
 }
 
 impl<U: Units> Band<'_, U> {
-    /// Sweeps the band; `edges` are the beliefs around its borders. If the messages are `initial`, the old
-    /// ones are 0 whatever is stored, and nothing has to be loaded from memory for them.
+    /// Sweeps the band; `edges` are the beliefs around its borders. If `initial`, the old messages count as
+    /// 0, whatever is stored, and need not be loaded from memory.
     fn sweep(
         &mut self,
         factors: &Factors,

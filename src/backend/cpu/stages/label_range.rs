@@ -1,4 +1,4 @@
-//! Restricts the costs to the pixels' label ranges: see [`crate::backend::Stage::LabelRange`].
+//! Limits costs to the label ranges of the pixels: see [`crate::backend::Stage::LabelRange`].
 
 use crate::backend::cpu::units::Units;
 use crate::backend::cpu::volumes::Volumes;

@@ -46,7 +46,7 @@ fn around(level: &LevelPlan, candidates: &Plane<[u16; 2]>, offset: i32) -> Plane
     let (runs, rows) = level.windows();
     let mut windows = Plane::filled(runs, rows, [0; 2]);
     windows.data_mut().par_chunks_mut(runs).enumerate().for_each_init(
-        // Lowest and highest candidate of each column, over all rows that are near.
+        // Lowest and highest candidate of each column, over all rows within reach.
         || vec![(0, 0); width],
         |columns, (y, windows)| {
             columns.fill((u16::MAX, 0));
@@ -68,7 +68,7 @@ fn around(level: &LevelPlan, candidates: &Plane<[u16; 2]>, offset: i32) -> Plane
     windows
 }
 
-/// The windows that hold the label ranges of their pixels.
+/// The windows that contain the label ranges of their pixels.
 fn within(level: &LevelPlan, ranges: &Plane<[u16; 2]>) -> Plane<[u16; 2]> {
     let (runs, rows) = level.windows();
     Plane::from_fn(runs, rows, |run, row| {
@@ -81,7 +81,7 @@ fn within(level: &LevelPlan, ranges: &Plane<[u16; 2]>) -> Plane<[u16; 2]> {
     })
 }
 
-/// First label and number of cells of the window that holds the labels from `least` to `most`.
+/// First label and number of cells of the window that contains the labels from `least` to `most`.
 fn holding(level: &LevelPlan, least: i32, most: i32) -> [u16; 2] {
     let last = level.labels as i32 - 1;
     let (least, most) = (least.clamp(0, last) as usize, most.clamp(0, last) as usize);

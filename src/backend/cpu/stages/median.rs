@@ -1,8 +1,8 @@
 //! The weighted median of the disparities: see [`crate::backend::Stage::Median`].
 //!
-//! Neighbouring pixels of a row are the lanes of vectors: what a place of the window holds for all of them is adjacent, and no sum
-//! crosses lanes. Values are searched as bytes, in steps from a base of each lane: every pass over the window sums the weights of
-//! what is below a value, and halves the interval with the median. This needs no sort.
+//! The lanes of vectors are neighbouring pixels of a row: values of one place of the window are adjacent, and
+//! no sum crosses lanes. Values are searched as bytes, in steps from a base per lane: each pass over the
+//! window sums the weights below a value, and halves the interval of the median. This needs no sorting.
 
 use crate::backend::cpu::least_squares::Planes;
 use crate::backend::cpu::places::{LANES, Values, Weighed};
@@ -21,7 +21,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     smooth(&MedianWeights::of(&plan.method), touched(plan), None, guide, maps);
 }
 
-/// Whether the median changes a pixel with such flags.
+/// Whether the median changes a pixel with these flags.
 pub(super) fn touched(plan: &Plan) -> impl Fn(u8) -> bool + Sync {
     let median = plan.method.refinement.median;
     move |f: u8| match median {
@@ -31,8 +31,8 @@ pub(super) fn touched(plan: &Plan) -> impl Fn(u8) -> bool + Sync {
     }
 }
 
-/// Applies the median to every pixel whose flags are `touched`. Such a pixel has a disparity. Where there are `limits`, planes
-/// follow, whose values stay within.
+/// Applies the median to the pixels whose flags are `touched`, all of which must have a disparity. With
+/// `limits`, fits planes afterwards, with values clamped to these.
 pub(super) fn smooth(
     weights: &MedianWeights,
     touched: impl Fn(u8) -> bool + Sync,
@@ -42,27 +42,32 @@ pub(super) fn smooth(
 ) {
     let MapSet { disparity, validity: flags, .. } = maps;
     let width = disparity.width();
-    let seen = Seen::new(weights, guide, disparity, flags);
+    let input = MedianInput::new(weights, guide, disparity, flags);
     let disparity = disparity.data_mut().par_chunks_mut(width).enumerate();
-    disparity.for_each_init(Window::default, |window, (y, row)| {
+    disparity.for_each_init(MedianWindow::default, |window, (y, row)| {
         window.limits = limits;
-        window.open(weights, &seen, y);
+        window.open(weights, &input, y);
         window.touched.clear();
         window.touched.extend(flags.row(y).iter().map(|&f| mask(touched(f))));
         window.touched.resize(width + LANES, 0);
-        median_row(window, &seen, row);
+        median_row(window, &input, row);
     });
 }
 
-/// The results of the touched pixels of the row that `window` is open at.
+/// Computes the touched pixels of the current row of `window`.
 #[pulp::with_simd(median_row = crate::vectors::widest())]
 #[inline(always)]
-fn median_row_on<'a, S: pulp::Simd>(_: S, window: &'a mut Window, seen: &'a Seen, row: &'a mut [i32]) {
+fn median_row_on<'a, S: pulp::Simd>(
+    _: S,
+    window: &'a mut MedianWindow,
+    input: &'a MedianInput,
+    row: &'a mut [i32],
+) {
     let mut x = 0;
     while let Some(skipped) = window.touched[x..].iter().position(|&touched| touched > 0) {
         x += skipped;
         let touched: [u8; LANES] = *block(&window.touched, x);
-        let results = window.results(seen, x, &touched);
+        let results = window.results(input, x, &touched);
         for ((out, result), _) in row[x..].iter_mut().zip(results).zip(touched).filter(|each| each.1 > 0) {
             *out = result;
         }
@@ -70,19 +75,19 @@ fn median_row_on<'a, S: pulp::Simd>(_: S, window: &'a mut Window, seen: &'a Seen
     }
 }
 
-/// The input of the windows, with unknown pixels beyond the ends of the rows.
-struct Seen {
+/// The input of the windows, with unknown pixels beyond the ends of rows.
+struct MedianInput {
     /// Number of unknown pixels before each row.
     margin: usize,
     pitch: usize,
     height: usize,
     guides: [Vec<u8>; 3],
-    /// The largest value where there is a disparity, else 0.
+    /// The largest value for pixels with a disparity, else 0.
     known: Vec<u8>,
     values: Vec<i32>,
 }
 
-impl Seen {
+impl MedianInput {
     fn new(weights: &MedianWeights, guide: &Image, disparity: &Plane<i32>, flags: &Plane<u8>) -> Self {
         let (width, height) = disparity.size();
         let margin = weights.radius << weights.step_bits[0];
@@ -102,7 +107,7 @@ impl Seen {
     }
 }
 
-/// The guides of a row, and where it is known.
+/// The guides of a row, and the pixels with a disparity.
 #[pulp::with_simd(seen_row = crate::vectors::widest())]
 #[inline(always)]
 fn seen_row_on<'a, S: pulp::Simd>(
@@ -122,28 +127,27 @@ fn seen_row_on<'a, S: pulp::Simd>(
     }
 }
 
-/// Without planes, the median is searched in steps of 2 to so many 1/256 px, and then within one of them.
+/// Without planes, the median is searched in steps of 2^this / 256 px, then within one step.
 const COARSE_BITS: u32 = 8;
 
 /// The windows of [`LANES`] adjacent pixels.
 #[derive(Default)]
-struct Window {
-    /// Where the row of the centres starts in the input.
+struct MedianWindow {
+    /// Index of the row of the centres in the input.
     centre: usize,
     radius: usize,
-    /// By place: where it lies in the input for the pixel in column 0, how many steps from the centre, and the weight of what has
-    /// the colour of the centre there.
+    /// By place: index in the input for column 0, steps from the centre, and weight at equal colour.
     offsets: Vec<(usize, [i16; 2], u8)>,
     doublings: u32,
-    /// What the values of planes stay within, where planes follow the median.
+    /// Limits of the values of planes; `None` for the median alone.
     limits: Option<(i32, i32)>,
     planes: Planes,
-    /// All bits for each pixel of the row that takes its median.
+    /// All bits set for each pixel of the row that changes.
     touched: Vec<u8>,
     /// The first `count` places have weight.
     weighed: Vec<Weighed>,
     values: Vec<Values>,
-    /// The same values in steps.
+    /// The values in steps.
     steps: Vec<[i8; LANES]>,
     count: usize,
     /// Half of the weight of all places, rounded up.
@@ -152,15 +156,15 @@ struct Window {
     found: [i8; LANES],
 }
 
-impl Window {
-    /// Moves to row `y`, whose windows leave out what is above and below the image.
-    fn open(&mut self, weights: &MedianWeights, seen: &Seen, y: usize) {
+impl MedianWindow {
+    /// Moves to row `y`; rows outside the image are left out.
+    fn open(&mut self, weights: &MedianWeights, input: &MedianInput, y: usize) {
         let [column_step, row_step] = weights.step_bits.map(|bits| 1 << bits);
-        // The rows of the window, without those that it skips.
+        // The rows of the window, every second one.
         let (apart, reach) = (row_step << WINDOW_ROW_BITS, weights.radius >> WINDOW_ROW_BITS);
         let first = y - reach.min(y / apart) * apart;
         self.offsets.clear();
-        for ny in (first..(y + reach * apart + 1).min(seen.height)).step_by(apart) {
+        for ny in (first..(y + reach * apart + 1).min(input.height)).step_by(apart) {
             for (column, &taken) in weights.space_row(ny.abs_diff(y) / row_step).iter().enumerate() {
                 let steps = [
                     column as i16 - weights.radius as i16,
@@ -170,35 +174,35 @@ impl Window {
                     continue;
                 }
                 let near = MEDIAN_WEIGHT.saturating_sub(taken);
-                self.offsets.push((ny * seen.pitch + column * column_step, steps, near));
+                self.offsets.push((ny * input.pitch + column * column_step, steps, near));
             }
         }
         self.radius = weights.radius;
-        (self.centre, self.doublings) = (y * seen.pitch + seen.margin, weights.doublings);
+        (self.centre, self.doublings) = (y * input.pitch + input.margin, weights.doublings);
         let most = self.offsets.len().next_multiple_of(2);
         self.weighed.resize(most, Weighed::default());
         self.values.resize(most, Values::default());
         self.steps.resize(most, [0; LANES]);
     }
 
-    /// The medians, or what planes make of them, of the pixels from column `x` on, as far as they are `touched`.
+    /// The results for the touched pixels from column `x` on: medians or planes.
     #[inline(always)]
-    fn results(&mut self, seen: &Seen, x: usize, touched: &[u8; LANES]) -> [i32; LANES] {
-        // To the nearest step where planes follow, else to the one below.
+    fn results(&mut self, input: &MedianInput, x: usize, touched: &[u8; LANES]) -> [i32; LANES] {
+        // Round to the nearest step for planes, else down.
         let (bits, half) = if self.limits.is_some() {
             (PLANE_START_BITS, 1 << (PLANE_START_BITS - 1))
         } else {
             (COARSE_BITS, 0)
         };
-        // Each lane's own value, at first, in whole steps.
-        let own: &[i32; LANES] = block(&seen.values, self.centre + x);
+        // Start at the own value of each lane, in whole steps.
+        let own: &[i32; LANES] = block(&input.values, self.centre + x);
         let mut base: [i32; LANES] = each_lane(|i| ((own[i] + i32::from(half)) >> bits) << bits);
-        self.weigh(seen, x, touched);
+        self.weigh(input, x, touched);
         let found = loop {
-            self.load(seen, &base);
+            self.load(input, &base);
             self.find(&[-half; LANES], bits);
             let found: [i16; LANES] = each_lane(|i| i16::from(self.found[i]) << bits);
-            // Beyond the ends of a byte the search goes on from there.
+            // At the ends of the range of bytes, the search continues from there.
             let is_end = |i: usize| touched[i] > 0 && matches!(self.found[i], i8::MIN | i8::MAX);
             if !(0..LANES).any(is_end) {
                 break found;
@@ -215,7 +219,7 @@ impl Window {
         each_lane(|i| (base[i] + i32::from(found[i]) + above[i]).clamp(low, high))
     }
 
-    /// Finds the medians of the values, less `origin`, in steps of 2 to `bits`.
+    /// Finds the medians of the values relative to `origin`, in steps of 2^`bits`.
     #[inline(always)]
     fn find(&mut self, origin: &[i16; LANES], bits: u32) {
         let count = self.count;
@@ -225,15 +229,15 @@ impl Window {
         search(&self.steps[..pairs], &self.weighed, &self.need, &mut self.found);
     }
 
-    /// Finds the places that have weight for any of the pixels `touched`.
+    /// Finds the places with weight for any of the `touched` pixels.
     #[inline(always)]
-    fn weigh(&mut self, seen: &Seen, x: usize, touched: &[u8; LANES]) {
-        let cells = seen.known.len();
-        let known = &seen.known[..cells];
-        let [red, green, blue] = seen.guides.each_ref().map(|guide| &guide[..cells]);
+    fn weigh(&mut self, input: &MedianInput, x: usize, touched: &[u8; LANES]) {
+        let cells = input.known.len();
+        let known = &input.known[..cells];
+        let [red, green, blue] = input.guides.each_ref().map(|guide| &guide[..cells]);
         let centres: [[u8; LANES]; 3] = [red, green, blue].map(|guide| *block(guide, self.centre + x));
         let doublings = self.doublings;
-        // The value that takes all of the weight once it is doubled.
+        // The difference that takes all weight once doubled.
         let most = (MEDIAN_WEIGHT + 1) >> doublings;
         let mut count = 0;
         for &(offset, step, near) in &self.offsets {
@@ -254,23 +258,23 @@ impl Window {
         }
     }
 
-    /// Loads the values of all places that have weight, relative to `base`, and sums the weights.
+    /// Loads the values of the weighted places, relative to `base`, and sums the weights.
     #[inline(always)]
-    fn load(&mut self, seen: &Seen, base: &[i32; LANES]) {
+    fn load(&mut self, input: &MedianInput, base: &[i32; LANES]) {
         let mut total = [0u16; LANES];
         for (Values(values), Weighed { at, weights, .. }) in
             self.values.iter_mut().zip(&self.weighed[..self.count])
         {
             total = each_lane(|i| total[i].saturating_add(weights[i].into()));
-            let all: &[i32; LANES] = block(&seen.values, *at);
+            let all: &[i32; LANES] = block(&input.values, *at);
             *values = each_lane(|i| (all[i] - base[i]).clamp(i16::MIN.into(), i16::MAX.into()) as i16);
         }
         self.need = each_lane(|i| total[i].div_ceil(2));
     }
 }
 
-/// Divides `values`, less `origin`, into `steps` of 2 to `bits`. (A function of its own, as is the search: within another, compilers
-/// take vectors apart.)
+/// Divides `values`, relative to `origin`, into `steps` of 2^`bits`. (Like the search, it is a separate
+/// function, because compilers split up the vectors of inlined code.)
 #[pulp::with_simd(divide = crate::vectors::widest())]
 #[inline(always)]
 fn divide_on<'a, S: pulp::Simd>(
@@ -287,7 +291,7 @@ fn divide_on<'a, S: pulp::Simd>(
     }
 }
 
-/// The medians of `steps`, whose number is even: the largest values below which there is less weight than they `need`.
+/// The medians of an even number of `steps`: the largest values with less weight below them than they `need`.
 #[pulp::with_simd(search = crate::vectors::widest())]
 #[inline(always)]
 fn search_on<'a, S: pulp::Simd>(
@@ -299,7 +303,7 @@ fn search_on<'a, S: pulp::Simd>(
 ) {
     let mut all = [i8::MIN; LANES];
     let (steps, weighed) = (steps.as_chunks::<2>().0, weighed.as_chunks::<2>().0);
-    // Twice 64, since 128 is no number of 8 bits with a sign.
+    // 64 twice, because 128 does not fit in a signed byte.
     for step in [64i8, 64, 64, 32, 16, 8, 4, 2, 1] {
         let end: [i8; LANES] = each_lane(|i| all[i].saturating_add(step));
         let mut below = [0u16; LANES];
@@ -307,7 +311,7 @@ fn search_on<'a, S: pulp::Simd>(
             let a: [u8; LANES] = each_lane(|i| mask(a[i] < end[i]) & of_a.weights[i]);
             let b: [u8; LANES] = each_lane(|i| mask(b[i] < end[i]) & of_b.weights[i]);
             let both: [u8; LANES] = each_lane(|i| a[i].wrapping_add(b[i]));
-            // No sum saturates, but of sums that may wrap compilers make vectors of places.
+            // No sum saturates, but with wrapping sums compilers vectorize over places instead of lanes.
             below = each_lane(|i| below[i].saturating_add(u16::from(both[i])));
         }
         all = each_lane(|i| if below[i] < need[i] { end[i] } else { all[i] });
@@ -323,7 +327,7 @@ fn apart(guides: &[u8; LANES], centres: &[u8; LANES]) -> [u8; LANES] {
     each_lane(|i| above[i] | below[i])
 }
 
-/// All bits of `yes`.
+/// All bits set if `yes`.
 #[inline(always)]
 fn mask(yes: bool) -> u8 {
     u8::from(yes).wrapping_neg()

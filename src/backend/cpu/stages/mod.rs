@@ -1,4 +1,4 @@
-//! The stages on the CPU path: of each, the file of its name.
+//! The stages on the CPU path, each in the file of its name.
 
 use super::units::Units;
 use super::volumes::Volumes;
@@ -36,7 +36,7 @@ macro_rules! declare {
                 }
             }
 
-            /// Runs rows of a stage that goes row by row.
+            /// Runs a band of rows of a stage.
             pub(super) fn run_rows(&mut self, stage: Stage, sent: Sent, rows: Range<usize>) {
                 self.make_room(stage);
                 match stage {

@@ -12,7 +12,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     smooth(&MedianWeights::of_planes(&plan.method), touched(plan), Some(limits(plan)), guide, maps);
 }
 
-/// What the values of planes stay within.
+/// The limits of the values of planes.
 pub(super) fn limits(plan: &Plan) -> (i32, i32) {
     (plan.range.min * FRACTION, plan.range.max * FRACTION)
 }

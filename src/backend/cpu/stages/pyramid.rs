@@ -9,7 +9,7 @@ const WEIGHTS: [u32; 5] = [1, 4, 6, 4, 1];
 
 /// A stored cost.
 pub(super) trait StoredCost: Copy + Default + Ord + Send + Sync {
-    /// A type for sums over a 5 x 5 binomial window, of up to 256 times 254 or of 16-bit values.
+    /// A type for sums over a 5 x 5 binomial window of costs: 256 times up to 254, or of 16-bit values.
     type Sum: Copy + Default + Send + Sync;
 
     /// The largest value that can be stored.
@@ -81,8 +81,7 @@ impl StoredCost for u16 {
     }
 }
 
-/// Coarse rows that a thread takes at a time where the costs of the fine rows are not stored: those that two threads need are
-/// computed twice.
+/// Coarse rows per task if fine costs are not stored. Tasks recompute the fine rows that they share.
 const ROWS: usize = 16;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
@@ -120,12 +119,12 @@ fn reduce<C: StoredCost>(plan: &Plan, level: usize, fine: &[C], out: &mut [u16])
     );
 }
 
-/// The fine rows that a coarse row is computed from.
+/// The fine rows from which a coarse row is computed.
 fn around(y: usize, fine: &LevelPlan) -> [usize; 5] {
     [0, 1, 2, 3, 4].map(|j: usize| (2 * y + j).saturating_sub(2).min(fine.height - 1))
 }
 
-/// The last few rows of costs that were computed.
+/// The last few rows of costs.
 struct Held {
     row_cells: usize,
     costs: Vec<u8>,
@@ -138,7 +137,7 @@ impl Held {
         Self { row_cells, costs: vec![0; 5 * row_cells], rows: [None; 5] }
     }
 
-    /// The costs of `rows`, of which no two are more than four apart; `compute` gives those that are not held.
+    /// The costs of `rows`, no two more than four apart; `compute` computes those that are missing.
     fn rows(&mut self, rows: [usize; 5], compute: impl Fn(usize, &mut [u8])) -> [&[u8]; 5] {
         for y in rows {
             if self.rows[y % 5] != Some(y) {
@@ -152,9 +151,9 @@ impl Held {
 
 /// Working memory of a thread.
 struct Scratch<S> {
-    /// The five fine rows reduced over y.
+    /// The sum of the five fine rows over y.
     columns: Vec<S>,
-    /// One pixel reduced over x as well.
+    /// The sum for one pixel over x and y.
     sums: Vec<S>,
     /// Its mean, with a margin of two labels.
     smooth: Vec<u16>,
@@ -171,7 +170,7 @@ impl<S: Copy + Default> Scratch<S> {
     }
 }
 
-/// A row of a level, from five of the finer one.
+/// A row of a level, from five rows of the next finer one.
 #[pulp::with_simd(reduce_row = crate::vectors::widest())]
 #[inline(always)]
 fn reduce_row_on<'a, D: pulp::Simd, C: StoredCost>(
@@ -212,14 +211,13 @@ fn add_all<T: Copy, S: Copy + Default>(rows: [&[T]; 5], add: impl Fn(S, u32, T) 
     }
 }
 
-/// The cost of each coarse label from the smoothed costs of the fine labels: the five around coarse label z
+/// The cost of each coarse label from the smoothed costs of the fine labels; the five for coarse label z
 /// start at 2 z.
 #[inline(always)]
 fn reduce_labels(fine: &[u16], minimum: bool, out: &mut [u16]) {
     let pairs = || fine.chunks_exact(2);
     if minimum {
-        // Clamping repeats one of the three labels, unless the centre is outside; then it repeats the one
-        // inside.
+        // Clamping repeats one of the three labels; if the centre is outside, it repeats the one inside.
         for (out, (first, second)) in out.iter_mut().zip(pairs().zip(pairs().skip(1))) {
             *out = first[1].min(second[0]).min(second[1]);
         }

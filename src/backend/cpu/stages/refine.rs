@@ -1,8 +1,8 @@
-//! Disparities of half-size pixels by the full size: see [`crate::backend::Stage::Refine`].
+//! Refines the disparities of half-size pixels at full size: see [`crate::backend::Stage::Refine`].
 //!
-//! Bands of rows are independent of each other: a thread computes the census of a band and its surroundings, the costs of its pixels
-//! and of one more row on either side, and then the disparities. The costs of a pixel are [`LANES`] bytes, so that neighbours of other
-//! labels find theirs in them, a few bytes further.
+//! Bands of rows are independent: a thread computes the census of a band and its surroundings, the costs of
+//! its pixels and of one more row on either side, then the disparities. The costs of a pixel are [`LANES`]
+//! bytes; neighbours with other labels read them at an offset of a few bytes.
 
 use crate::backend::cpu::units::{Units, block, each_lane};
 use crate::backend::cpu::volumes::Volumes;
@@ -16,19 +16,19 @@ use std::ops::Range;
 
 /// Half-size rows that are processed together.
 const BAND: usize = 16;
-/// Full-size disparities whose costs are held of each pixel, from [`BEFORE`] below twice that of its label on.
+/// Number of full-size disparities with costs per pixel, from [`BEFORE`] below twice its label's on.
 const LANES: usize = 16;
 const BEFORE: usize = REACH + 1 + 2 * NEAR;
-/// How many bytes further than its own a pixel may read: costs of the next one, which count for nothing.
+/// Bytes past its own costs that a pixel may read; they belong to the next pixel, and are ignored.
 const FARTHER: usize = 4 * NEAR;
-/// Disparities whose sums are compared, and one more on either side of them.
+/// Number of sums: the disparities to compare, and one more on either side.
 const SUMS: usize = 2 * REACH + 3;
-/// Which of them is twice that of the label.
+/// Index of the sum for twice the label's disparity.
 const OWN: usize = REACH + 1;
 const _: () = assert!(SUMS + FARTHER <= LANES);
-/// Bits of the rank of a sum, which breaks ties; the sums of all blocks fit in the others.
+/// Bits of the rank of a sum, which breaks ties; the largest sum of costs fits in the others.
 const RANK_BITS: u32 = 4;
-/// Which sum has each rank: that of twice the label, and then those farther away, the smaller disparity first.
+/// Sums by rank: first twice the label's disparity, then by distance from it, the smaller disparity first.
 const BY_RANK: [usize; 1 << RANK_BITS] = {
     let mut sums = [OWN; 1 << RANK_BITS];
     let mut k = 1;
@@ -38,7 +38,7 @@ const BY_RANK: [usize; 1 << RANK_BITS] = {
     }
     sums
 };
-/// The rank of each sum; all bits where it is none that is compared.
+/// The rank of each sum; all bits are set for sums that are not compared.
 const RANKS: [u16; LANES] = {
     let mut ranks = [u16::MAX; LANES];
     let mut rank = 0;
@@ -48,7 +48,7 @@ const RANKS: [u16; LANES] = {
     }
     ranks
 };
-/// How many pixels around it a census sees.
+/// Radius of the census.
 const RADIUS: usize = 2;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
@@ -64,7 +64,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
         for (y, raw) in rows.zip(raw.chunks_exact_mut(width)) {
             let around = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
             let near = around.map(|y| (optima.row(y), scratch.costs_of(y - seen.start, width)));
-            // At the borders of the image a row is there once.
+            // At the borders of the image, the repeated row counts once.
             let first = usize::from(y == 0);
             let end = 3 - usize::from(y + 1 == height);
             fit_row(&near, first..end, plan.range.min, raw);
@@ -73,7 +73,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
     });
 }
 
-/// The views at full size, and what is the same for all rows.
+/// The views at full size, and constants of all rows.
 struct Views<'a> {
     left: View<'a>,
     right: View<'a>,
@@ -85,7 +85,7 @@ struct Views<'a> {
 impl<'a> Views<'a> {
     fn new(plan: &Plan, full: &'a Pair) -> Self {
         let range = plan.range;
-        // No label leads farther than this, and none farther than the view.
+        // Neither labels nor rows of the view reach farther.
         let farthest = 2 * range.min.unsigned_abs().max(range.max.unsigned_abs()) as usize + LANES;
         let margin = farthest.min(full.size().0 + LANES);
         let view = |image: &'a Image, mirrored| View { image, mirrored, any_masked: image.any_masked() };
@@ -93,26 +93,26 @@ impl<'a> Views<'a> {
     }
 }
 
-/// A view, from right to left where it is `mirrored`.
+/// A view, read from right to left if `mirrored`.
 struct View<'a> {
     image: &'a Image,
     mirrored: bool,
     any_masked: bool,
 }
 
-/// What a thread works on.
+/// Scratch memory of a thread.
 #[derive(Default)]
 struct Scratch {
     greys: Vec<u16>,
     left: Vec<u16>,
-    /// From right to left, with margins.
+    /// Mirrored, with margins.
     right: Vec<u16>,
-    /// [`LANES`] bytes a pixel, and some more behind the last.
+    /// [`LANES`] bytes per pixel, and [`FARTHER`] after the last.
     costs: Vec<u8>,
 }
 
 impl Scratch {
-    /// The costs of these half-size rows.
+    /// Computes the costs of half-size `rows`.
     fn fill<'a>(&mut self, views: &Views, rows: &Range<usize>, optima: impl Fn(usize) -> &'a [Optimum]) {
         let Self { greys, left, right, costs } = self;
         let (width, margin) = (views.left.image.width(), views.margin);
@@ -136,11 +136,11 @@ impl Scratch {
 }
 
 impl View<'_> {
-    /// The census of these rows, with so many columns without one on either side.
+    /// The census of `rows`, with `margin` columns without a census on either side.
     fn census(&self, rows: &Range<usize>, greys: &mut Vec<u16>, (out, margin): (&mut [u16], usize)) {
         let Self { image, mirrored, .. } = *self;
         let (width, height) = image.pixels.size();
-        // Greys with the ends of rows and columns repeated, and the masked ones at the largest value: below no other.
+        // Greys with replicated borders; masked ones are the largest value, which is below no other.
         let pitch = width + 2 * RADIUS;
         greys.resize((rows.len() + 2 * RADIUS) * pitch, 0);
         for (y, greys) in (rows.start..).zip(greys.chunks_exact_mut(pitch)) {
@@ -218,7 +218,7 @@ fn cost_row_on<'a, S: pulp::Simd>(
     let rows = [(left.0, right.0), (left.1, right.1)];
     for (x, (optimum, out)) in optima.iter().zip(out.as_chunks_mut::<LANES>().0).enumerate() {
         let first = 2 * (i32::from(optimum.label) + views.half_min) - BEFORE as i32;
-        // The bits of the lower and of the upper half of each census, a byte each.
+        // Differing bits of the lower and upper half of each census, one byte each.
         let mut sums = [0u8; 2 * LANES];
         for (left, right) in rows {
             let most = (right.len() - LANES) as i32;
@@ -236,8 +236,8 @@ fn cost_row_on<'a, S: pulp::Simd>(
     }
 }
 
-/// The disparities of a row, from the optima and the costs of the row above, itself and the row below, of which those in `inside`
-/// are there.
+/// The disparities of a row, from the optima and costs of the row above, itself and the row below; only the
+/// rows in `inside` exist.
 #[pulp::with_simd(fit_row = crate::vectors::widest())]
 #[inline(always)]
 fn fit_row_on<'a, S: pulp::Simd>(
@@ -264,7 +264,7 @@ fn fit_row_on<'a, S: pulp::Simd>(
         let keys: [u16; LANES] = each_lane(|at| (sums[at] << RANK_BITS) | RANKS[at]);
         let least = keys.into_iter().fold(u16::MAX, u16::min);
         let best = BY_RANK[usize::from(least) % BY_RANK.len()];
-        // Apart from those above, which stay in registers: what is indexed by a variable lies in memory.
+        // Copied, because indexing would force the sums above out of registers.
         let sums: [u16; LANES] = std::hint::black_box(sums);
         let [a, b, c] = [best - 1, best, best + 1].map(|at| i32::from(sums[at]));
         let slope = a.max(c) - b;

@@ -13,22 +13,22 @@ use crate::threads::prelude::*;
 use std::ops::Range;
 
 struct Scratch<U> {
-    /// First label and number of cells of the parent's window and of the children's; what lies outside them is infinite in
-    /// `child` and `fine`.
+    /// (first label, number of cells) of the windows of the parent and the children; `child` and `fine` are
+    /// infinite outside them.
     windows: Option<[(usize, usize); 2]>,
     /// q of the parent, by label of its window.
     parent: Vec<U>,
-    /// q of each child: the fine label that agrees best with label z of the parent's window is at `margin` + 2 z + 1.
+    /// q of each child; the fine label that agrees best with label z of the parent's window is at `margin` + 2 z + 1.
     child: [Vec<U>; 4],
     /// U of each child, \[child\]\[label of the parent's window\]; 0 for a child outside the image.
     best: [Vec<U>; 4],
-    /// The message to the parent before its truncation, and t of each child followed by an infinite value.
+    /// The message to the parent before truncation, and t of each child followed by an infinite value.
     sums: [Vec<U>; 5],
-    /// The message to each child before its truncation; the fine label that agrees best with label z is at `margin` + 2 z.
+    /// The message to each child before truncation; the fine label that agrees best with label z is at `margin` + 2 z.
     fine: [Vec<U>; 4],
 }
 
-/// The data shared by all factors between two levels.
+/// Data shared by all factors between two levels.
 struct Between<U> {
     cut: Truncation,
     interpolating: bool,
@@ -40,7 +40,7 @@ struct Between<U> {
     coarse_padding: Vec<U>,
 }
 
-/// The messages of the factors of these coarse rows.
+/// The messages of the factors of the coarse `rows`.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows: Range<usize>) {
     let plan = &v.plan;
     let (finer, coarser) = v.levels.split_at_mut(level);
@@ -113,8 +113,8 @@ fn row_on<'a, S: pulp::Simd, U: Units>(
     }
 }
 
-/// The messages of the factor between a pixel and its children, whose windows are `own` and `theirs`; `children` says where
-/// the cells of each start.
+/// The messages of the factor between a pixel and its children, with the windows `own` and `theirs`;
+/// `children` are the start indices of their cells.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "volumes of both levels")]
 fn factor<U: Units>(
@@ -140,12 +140,11 @@ fn factor<U: Units>(
             sums[own.stride()] = U::MOST;
         }
     }
-    // Where the children's first label is in `fine`.
+    // Index in `fine` of the children's first label.
     let first = margin + theirs.first() + lead - 2 * own.first();
     let parent = &mut parent[..own.stride()];
     variable_message(coarse_belief, up, parent, coarse_padding, cut);
-    // Values written at one alignment and read at another go through memory, so everything is written before
-    // it is read.
+    // Values that are read at another alignment than written go through memory, so all are written first.
     for (place, child) in children.into_iter().zip(child.iter_mut()) {
         if let Some(at) = place {
             let (belief, old) = (&fine_belief[at..][..theirs.stride()], &down[at..][..theirs.stride()]);
@@ -161,7 +160,7 @@ fn factor<U: Units>(
             agreeing(block(child, margin + 2 * z), interpolating, block_mut(best, z));
         }
     }
-    // Saturated sums cannot be undone by subtraction, so each sum is taken over the others.
+    // Saturated sums cannot be undone by subtraction, so each sum is computed from the others.
     let mut least = [U::MOST; LABEL_BLOCK];
     for z in (0..own.stride()).step_by(LABEL_BLOCK) {
         let [u0, u1, u2, u3] =
@@ -187,7 +186,7 @@ fn factor<U: Units>(
     truncate(&sums[0], least, cut, up);
     for ((place, t), fine) in children.into_iter().zip(&sums[1..]).zip(fine.iter_mut()) {
         if place.is_some() {
-            // The label below the parent's first agrees with it too.
+            // The label below the parent's first also agrees with it.
             fine[margin - 1] = if interpolating { t[0] } else { U::MOST };
             for z in (0..own.stride()).step_by(LABEL_BLOCK) {
                 spread(block(t, z), interpolating, block_mut(fine, margin + 2 * z));
@@ -207,7 +206,7 @@ fn factor<U: Units>(
     }
 }
 
-/// The smallest q of the fine labels that agree with each coarse label; `around` holds those below, at and
+/// The smallest q of the fine labels that agree with each coarse label; `around` contains those below, at and
 /// above the centres.
 #[inline(always)]
 fn agreeing<U: Units>(around: &[U; 2 * LABEL_BLOCK + 1], interpolating: bool, best: &mut [U; LABEL_BLOCK]) {

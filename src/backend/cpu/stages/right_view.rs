@@ -7,15 +7,15 @@ use crate::plan::Plan;
 use crate::threads::prelude::*;
 use std::ops::Range;
 
-/// These rows of the right view.
+/// Computes `rows` of the right view.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     let (plan, maps, Level { belief, windows, .. }) = (&v.plan, &mut v.maps, &v.levels[0]);
     let (width, labels) = (plan.levels[0].width, plan.levels[0].labels);
     let names: Vec<u32> = (0..labels as u32).collect();
     let right = maps.right.rows_mut(rows.clone()).par_chunks_mut(width);
     right.zip(maps.right_best.rows_mut(rows.clone()).par_chunks_mut(width)).zip(rows).for_each_init(
-        // By the right pixel's place from the right, so that ascending labels are side by side: belief and label of the best
-        // so far, or as much as [`crate::backend::NO_LABEL`] says in both.
+        // By position from the right, so that ascending labels are adjacent: belief and label of the best so
+        // far, or all bits ([`crate::backend::NO_LABEL`] in both).
         || vec![u32::MAX; width],
         |found, ((right, best), y)| {
             found.fill(u32::MAX);
@@ -42,7 +42,7 @@ fn right_row_on<'a, S: pulp::Simd, U: Units>(
     let width = level.width;
     for x in plan.core.clone() {
         let window = windows.row(y)[x];
-        // Label j of left pixel x is seen at right pixel x - min - j.
+        // Label j of left pixel x is at right pixel x - min - j.
         let place = (width - 1 - x) as i64 + i64::from(level.min);
         let labels = windows.range(window);
         let first = (-place).clamp(labels.start as i64, labels.end as i64) as usize;
@@ -54,7 +54,7 @@ fn right_row_on<'a, S: pulp::Simd, U: Units>(
         let belief = &row[window.start() + first - window.first()..][..end - first];
         let beliefs = belief.iter().zip(&names[first..end]);
         for (found, (&b, &label)) in found[seen].iter_mut().zip(beliefs) {
-            // The smallest belief, and of those the lowest label.
+            // The smallest belief, then the lowest label.
             let b: u32 = b.into();
             *found = (*found).min(b << 16 | label);
         }

@@ -10,7 +10,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
     let MapSet { optima, validity, .. } = maps;
     let (width, height) = optima.size();
     let flags = validity.data_mut();
-    // With a border of pixels that belong to no region, so that every pixel has four neighbours.
+    // A border of pixels without a region gives every pixel four neighbours.
     let pitch = width + 2;
     let mut labels = vec![0; pitch * (height + 2)];
     let mut seen = vec![true; labels.len()];

@@ -1,8 +1,8 @@
-//! Disparities between the labels: see [`crate::backend::Stage::SubPixel`].
+//! Sub-pixel disparities: see [`crate::backend::Stage::SubPixel`].
 //!
-//! A neighbour counts where its label is at most [`NEAR`] away, so the sums need of its costs only those up to [`FAR`] labels from its
-//! own. The costs at each distance from the own label are a plane: neighbouring pixels are the lanes of vectors, and which
-//! plane of a neighbour a pixel takes depends on how far their labels are apart.
+//! Neighbours count if their label is at most [`NEAR`] away, so their costs are needed only up to [`FAR`]
+//! labels from their own label. The costs at each distance from it form a plane. The lanes of vectors are
+//! neighbouring pixels; the difference of labels selects the plane of a neighbour.
 
 use crate::backend::cpu::features::FAR;
 use crate::backend::cpu::units::{Units, block, each_lane};
@@ -14,7 +14,7 @@ use crate::stage::{MapSet, Optimum};
 use crate::threads::prelude::*;
 use std::ops::Range;
 
-/// The disparities of these rows.
+/// Computes the disparities of `rows`.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     let Volumes { plan, features, fine_cost, maps, .. } = v;
     let level = &plan.levels[0];
@@ -62,19 +62,18 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
 
 /// Number of rows that are processed together.
 const BAND: usize = 8;
-/// How many columns away a neighbour may be.
+/// Largest horizontal distance of a neighbour.
 const RADIUS: usize = 2;
-/// How far the label of a neighbour may be away.
+/// Largest difference of the label of a neighbour.
 const NEAR: u16 = 2;
 // Its costs are needed one label further.
 const _: () = assert!(FAR == NEAR as usize + 1);
-/// Stands for "no label" here: far from every label, also where differences wrap.
+/// Replaces [`NO_LABEL`]: it is far from every label, even if differences wrap.
 const NOWHERE: u16 = 1 << 15;
 /// Number of pixels whose costs are summed together, in vectors of 16 bits.
 const LANES: usize = 16;
 
-/// Of [`LANES`] pixels, the sums of the costs at the label below, at the label and above; 0 where nothing is placed between
-/// the labels.
+/// Sums of costs below, at and above the label, for [`LANES`] pixels; 0 without sub-pixel disparities.
 type Sums = [[u16; LANES]; 3];
 
 #[derive(Default)]
@@ -88,12 +87,12 @@ struct Scratch {
 #[derive(Default)]
 struct Near {
     labels: Vec<u16>,
-    /// From [`FAR`] labels below the label to as many above it. Those outside the range are never used.
+    /// From [`FAR`] labels below the label to [`FAR`] above. Those outside the range are never used.
     costs: [Vec<u16>; 2 * FAR + 1],
 }
 
 impl Near {
-    /// The same as without any labels.
+    /// Resets all pixels to "no label".
     fn clear(&mut self, width: usize) {
         let cells = width.next_multiple_of(LANES) + 2 * RADIUS;
         self.labels.clear();
@@ -101,7 +100,7 @@ impl Near {
         self.costs.iter_mut().for_each(|costs| costs.resize(cells, 0));
     }
 
-    /// Takes the labels of a row, and a word of costs for each.
+    /// Loads the labels of a row, and a word of costs for each.
     fn fill(&mut self, optima: &[Optimum], words: &[u64]) {
         for (to, &Optimum { label, .. }) in self.labels[RADIUS..].iter_mut().zip(optima) {
             *to = if label == NO_LABEL { NOWHERE } else { label };
@@ -114,7 +113,7 @@ impl Near {
     }
 }
 
-/// Collects the costs around the labels of row `y` from those of all pixels, a byte each.
+/// Collects the costs around the labels of row `y`, one byte each, from a whole volume.
 fn collect(level: &LevelPlan, cost: &[u8], y: usize, optima: &[Optimum], words: &mut [u64]) {
     let cells = (y * level.width * level.stride..).step_by(level.stride);
     for ((&Optimum { label, .. }, start), word) in optima.iter().zip(cells).zip(words) {
@@ -123,13 +122,13 @@ fn collect(level: &LevelPlan, cost: &[u8], y: usize, optima: &[Optimum], words: 
         }
         let first = (start + usize::from(label)).wrapping_sub(FAR);
         let bytes = cost.get(first..).and_then(|cells| cells.first_chunk());
-        // At the ends of the volume, one by one.
+        // At the ends of the volume, read byte by byte.
         let one = |k: usize| cost.get(first.wrapping_add(k)).copied().unwrap_or(0);
         *word = u64::from_le_bytes(bytes.copied().unwrap_or_else(|| std::array::from_fn(one)));
     }
 }
 
-/// The sums of a row from its own costs and those of the rows around it.
+/// The sums of a row from its own costs and those of the two adjacent rows.
 #[pulp::with_simd(sum_row = crate::vectors::widest())]
 #[inline(always)]
 fn sum_row_on<'a, S: pulp::Simd>(_: S, near: [&'a Near; 3], sums: &'a mut [Sums]) {
@@ -140,7 +139,7 @@ fn sum_row_on<'a, S: pulp::Simd>(_: S, near: [&'a Near; 3], sums: &'a mut [Sums]
             for column in x..=x + 2 * RADIUS {
                 let labels: &[u16; LANES] = block(labels, column);
                 let costs: [&[u16; LANES]; 2 * FAR + 1] = costs.each_ref().map(|costs| block(costs, column));
-                // By how much the label of the centre is above that of the neighbour, from -NEAR on.
+                // The label of the centre minus that of the neighbour, plus NEAR.
                 let above: [u16; LANES] =
                     each_lane(|i| centres[i].wrapping_sub(labels[i]).wrapping_add(NEAR));
                 for apart in 0..=2 * usize::from(NEAR) {
@@ -156,7 +155,7 @@ fn sum_row_on<'a, S: pulp::Simd>(_: S, near: [&'a Near; 3], sums: &'a mut [Sums]
     }
 }
 
-/// How far the disparity is above the label.
+/// The offset of the disparity from the label.
 #[inline(always)]
 fn offset([below, at, above]: [i32; 3]) -> i32 {
     let slope = below.max(above) - at;

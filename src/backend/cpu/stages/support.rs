@@ -1,4 +1,4 @@
-//! The confidence that the pixels around a pixel support: see [`crate::backend::Stage::Support`].
+//! The support of each pixel: see [`crate::backend::Stage::Support`].
 
 use crate::image::{Pair, Plane};
 use crate::maps::flag;
@@ -8,10 +8,10 @@ use crate::stage::MapSet;
 use crate::threads::prelude::*;
 use std::iter::repeat_n;
 
-/// Rows that are worth a thread.
+/// Minimum number of rows per thread.
 const LEAST_ROWS: usize = 16;
 
-/// A row with what counts beyond both of its ends.
+/// A row with replicated ends.
 #[derive(Default)]
 struct Row {
     disparities: Vec<i32>,
@@ -66,7 +66,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
     );
 }
 
-/// The sums over the places of each pixel of the row in the middle.
+/// The sums over the places of each pixel of the middle row.
 #[pulp::with_simd(sum = crate::vectors::widest())]
 #[inline(always)]
 fn sum_on<'a, S: pulp::Simd>(_: S, rows: &'a [Row; SUPPORT_PLACES], sums: &'a mut [i32]) {

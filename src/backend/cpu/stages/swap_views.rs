@@ -1,4 +1,4 @@
-//! The right view in place of the left one: see [`crate::backend::Stage::SwapViews`].
+//! Exchanges the views: see [`crate::backend::Stage::SwapViews`].
 
 use crate::backend::cpu::units::Units;
 use crate::backend::cpu::volumes::Volumes;

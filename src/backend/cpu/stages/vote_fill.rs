@@ -1,4 +1,4 @@
-//! Votes on what was filled: see [`crate::backend::Stage::VoteFill`].
+//! Fills by votes: see [`crate::backend::Stage::VoteFill`].
 
 use crate::backend::cpu::colours::{channels, difference, mean_colours};
 use crate::backend::cpu::units::{block, each_lane};
@@ -23,12 +23,12 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     }
 }
 
-/// Whether a pixel with such flags and such a confidence shows something for sure.
+/// Whether a pixel with these flags and this confidence is sure.
 fn is_sure(flags: u8, confidence: u8) -> bool {
     flags & flag::INVALID == 0 && u32::from(confidence) >= VOTE_SURE
 }
 
-/// Whether such a pixel may be outvoted.
+/// Whether a pixel with these flags and this confidence may be outvoted.
 fn may_be_outvoted(flags: u8, confidence: u8) -> bool {
     flags & flag::INVALID == 0 && !is_sure(flags, confidence)
 }
@@ -39,7 +39,7 @@ fn weighted(weight: u32, sum: u32) -> u32 {
     (sum >> 16) * weight + (((sum & 0xffff) * weight) >> 16)
 }
 
-/// The half-size pixels that a filled pixel may take its vote from, and those whose vote may outvote a pixel.
+/// The half-size pixels with needed votes: filled pixels may take them, or they may outvote a pixel.
 fn asked(maps: &MapSet, votes: Votes) -> Plane<bool> {
     let MapSet { validity, confidence, .. } = maps;
     let mut asked = Plane::filled(votes.width, votes.height, false);
@@ -58,16 +58,16 @@ fn asked(maps: &MapSet, votes: Votes) -> Plane<bool> {
     asked
 }
 
-/// The columns or rows of half-size pixels next to the one of pixel `at`, of so many.
+/// The columns or rows of half-size pixels within 1 of that of pixel `at`, of `count`.
 fn around(at: usize, count: usize) -> std::ops::Range<usize> {
     (at / 2).saturating_sub(1)..(at / 2 + 2).min(count)
 }
 
-/// The votes of the half-size pixels that are asked, in 1/256 px, where there is one.
+/// The votes of the half-size pixels that are needed, in 1/256 px, or `None`.
 fn elect(maps: &MapSet, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> Plane<Option<i32>> {
     let asked = asked(maps, votes);
     let [along, across] = vote_weights();
-    // Weights of the steps between each half-size pixel and the one above.
+    // Weights of the steps from each half-size pixel to the one above.
     let mut steps_down = Plane::filled(votes.width, votes.height, 0);
     steps_down.data_mut().par_chunks_mut(votes.width).enumerate().skip(1).for_each(|(y, weights)| {
         for (weight, (&here, &above)) in weights.iter_mut().zip(colours.row(y).iter().zip(colours.row(y - 1)))
@@ -76,7 +76,7 @@ fn elect(maps: &MapSet, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> 
         }
     });
     let mut elected = Plane::filled(votes.width, votes.height, None);
-    // With padding, which nobody votes for.
+    // Labels are padded to whole blocks; padding gets no votes.
     let stride = votes.labels.next_multiple_of(BLOCK);
     let row_length = votes.width * stride;
     let mut sums = vec![0; votes.summed() * row_length];
@@ -96,7 +96,7 @@ fn elect(maps: &MapSet, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> 
             totals.resize(stride, 0);
             for (x, vote) in out.iter_mut().enumerate().filter(|(x, _)| asked[(*x, y)]) {
                 let at = |row: usize| (row - seen.start) * row_length + x * stride;
-                // A step from outside the image has no weight.
+                // Steps from outside the image have weight 0.
                 let mut steps = [[Step::default(); 2]; VOTE_REACH];
                 for (away, [above, below]) in (1..=VOTE_REACH).rev().zip(&mut steps) {
                     if let Some(row) = y.checked_sub(away) {
@@ -117,32 +117,32 @@ fn elect(maps: &MapSet, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> 
 /// Number of labels whose sums stay in registers.
 const BLOCK: usize = 8;
 
-/// A step along a column: where the sums of the row that it leaves begin, and its weight.
+/// A step along a column: the index of the sums of the row it starts from, and its weight.
 #[derive(Clone, Copy, Default)]
 struct Step {
     from: usize,
     weight: u32,
 }
 
-/// What a row of half-size pixels needs on the way.
+/// Scratch memory for one row of half-size pixels.
 #[derive(Default)]
 struct Scratch {
-    /// How near a label must be to hide what the right view sees. For the pixel in column x of a row that is w wide, the label with
-    /// index k has its value at w - x + k: at half of that, where even and odd are apart, so that even labels follow each other.
+    /// By label: how near it must be to hide a label in the right view. For the pixel in column x of a row of width w, the value
+    /// for label k is at index w - x + k, split by parity into two vectors, so that even labels are adjacent.
     hiding: [Vec<i32>; 2],
     /// Weights of the steps between neighbours.
     steps: Vec<u32>,
-    /// By label: the sum from the left, and what comes from the right.
+    /// By label: the sum from the left, and the sum carried from the right.
     here: Vec<u32>,
     carried: Vec<u32>,
 }
 
-/// Own votes of the half-size pixels of row `y`, \[x\]\[label\].
+/// Votes of the half-size pixels of row `y` themselves, \[x\]\[label\].
 fn own_votes(maps: &MapSet, plan: &Plan, y: usize, out: &mut [u32], scratch: &mut Scratch) {
     let (width, height) = maps.disparity.size();
     let (min, labels) = (plan.range.min, plan.levels[0].labels);
     let stride = labels.div_ceil(2).next_multiple_of(BLOCK);
-    // How near label 0 is, and what each label adds.
+    // Nearness of label 0, and the increment per label.
     let (first, more) = match plan.method.refinement.nearer {
         Nearer::Larger => (0, 1),
         Nearer::Smaller => (labels as i32 - 1, -1),
@@ -175,7 +175,7 @@ fn own_votes(maps: &MapSet, plan: &Plan, y: usize, out: &mut [u32], scratch: &mu
     }
 }
 
-/// Votes for a disparity, in 1/256 px from the smallest label on.
+/// Votes for a disparity, in 1/256 px from the smallest label.
 #[pulp::with_simd(vote_for = crate::vectors::widest())]
 #[inline(always)]
 fn vote_for_on<S: pulp::Simd>(_: S, votes: &mut [u32], disparity: i32) {
@@ -185,7 +185,7 @@ fn vote_for_on<S: pulp::Simd>(_: S, votes: &mut [u32], disparity: i32) {
     }
 }
 
-/// Votes against the labels that are at least as near as `hiding` says. The first is as near as `near[0]`, and each label adds `near[1]`.
+/// Votes against labels at least as near as in `hiding`. `near` is the nearness of the first label and the increment.
 #[pulp::with_simd(vote_against_hiding = crate::vectors::widest())]
 #[inline(always)]
 fn vote_against_hiding_on<'a, S: pulp::Simd>(_: S, votes: &'a mut [u32], hiding: &'a [i32], near: [i32; 2]) {
@@ -195,7 +195,7 @@ fn vote_against_hiding_on<'a, S: pulp::Simd>(_: S, votes: &'a mut [u32], hiding:
     }
 }
 
-/// Sums the own votes of a row along it.
+/// Sums the votes of a row along it.
 #[pulp::with_simd(sum_row = crate::vectors::widest())]
 #[inline(always)]
 fn sum_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut [u32], stride: usize, scratch: &'a mut Scratch) {
@@ -223,7 +223,7 @@ fn sum_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut [u32], stride: usize, scratc
     }
 }
 
-/// The sums at `at`, and what comes along the column by the `steps` from above and below, the farthest first.
+/// The sums at `at` plus those carried along the column by `steps` from above and below, farthest first.
 #[pulp::with_simd(sum_column = crate::vectors::widest())]
 #[inline(always)]
 fn sum_column_on<'a, S: pulp::Simd>(
@@ -247,7 +247,7 @@ fn sum_column_on<'a, S: pulp::Simd>(
     }
 }
 
-/// The vote by these sums, from the smallest label on in 1/256 px; none where all are the same.
+/// The winner of `sums`, in 1/256 px from the smallest label; `None` if all are the same.
 fn winner(sums: &[u32]) -> Option<i32> {
     let (least, most) = extremes(sums);
     if most == least {
@@ -275,7 +275,7 @@ fn extremes_on<S: pulp::Simd>(_: S, sums: &[u32]) -> (u32, u32) {
     sums.iter().fold((u32::MAX, 0), |(least, most), &sum| (least.min(sum), most.max(sum)))
 }
 
-/// Every filled pixel takes the vote of the half-size pixel around it that looks most alike, and an outvoted one that of its own.
+/// Filled pixels take the vote of the most similar half-size pixel around them, outvoted ones that of their own.
 fn take(maps: &mut MapSet, left: &Image, colours: &Plane<[u8; 3]>, elected: &Plane<Option<i32>>) {
     let width = maps.disparity.width();
     let rows =
@@ -314,7 +314,7 @@ mod tests {
     use crate::stage::Optimum;
 
     #[test]
-    fn bands_change_nothing() {
+    fn bands_do_not_change_votes() {
         let (width, height) = (37, 61);
         let range = DisparityRange::new(0, 11).unwrap();
         let plan = Plan::new(width, height, range, &Method::default()).unwrap();

@@ -8,7 +8,7 @@ use crate::stage::Optimum;
 use crate::threads::prelude::*;
 use std::ops::Range;
 
-/// The optima of these rows.
+/// Computes the optima of `rows`.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     let (width, Level { belief, windows, .. }) = (v.plan.levels[0].width, &v.levels[0]);
     let optima = v.maps.optima.rows_mut(rows.clone()).par_chunks_mut(width);
@@ -32,8 +32,8 @@ fn optimum_row_on<'a, S: pulp::Simd, U: Units>(
     }
 }
 
-/// The optimum of the beliefs of one window, its label counted from the first. The belief of padding is the largest value, and
-/// behind all `labels`.
+/// The optimum of the beliefs in one window, with its label relative to the first. The belief of padding is
+/// the largest value, and comes after all `labels`.
 #[inline(always)]
 fn optimum_of<U: Units>(belief: &[U], labels: usize) -> Optimum {
     let (label, best) = argmin(belief);

@@ -1,6 +1,6 @@
 //! Beliefs: see [`Stage::Belief`](crate::backend::Stage::Belief).
 //!
-//! Floor, a label: 6 bytes moved and asked for, 20 operations for four; beside that the graph: 8 bytes a pixel, and 4 a member.
+//! Lower bound per label: 6 bytes moved and requested, 5 operations; for the graph 8 bytes per pixel and 4 per member.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -11,7 +11,7 @@ use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan};
 use crate::stage::{Data, Volume};
 use std::ops::Range;
 
-/// Quads of labels of an invocation.
+/// Quads of labels per invocation.
 const QUADS: u32 = LABEL_BLOCK as u32 / 4;
 
 shader! {
@@ -45,7 +45,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     Ok(())
 }
 
-/// The same for all of `levels` at once.
+/// Like `record`, in one dispatch for all `levels`.
 pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
     let (plan, buffers) = (r.plan, r.buffers);
     let own = |z: usize| (Uniform::of(plan, z), threads(&buffers.levels[z]));

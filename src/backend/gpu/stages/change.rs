@@ -1,4 +1,4 @@
-//! How much the label map changed, and whether it has settled: see [`Stage::Change`](crate::backend::Stage::Change).
+//! The change of the label map, and convergence: see [`Stage::Change`](crate::backend::Stage::Change).
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -9,7 +9,7 @@ shader! {
     "change"(plan, level) { most_low: u32, most_high: u32, may_settle: u32, endings: u32 }
     labels { belief, label_map, squares } => variant(plan, plan.levels[0].quads());
     sums { squares, row_sums } => variant(plan, plan.levels[0].width);
-    // The messages of a level take few dispatches, also together with those of others.
+    // At most 64 dispatches of messages per level, including joined ones.
     settle { row_sums, convergence, groups } => {
         variant(plan, plan.levels[0].height + 64 * plan.levels.len())
     };

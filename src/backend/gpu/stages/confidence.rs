@@ -1,4 +1,4 @@
-//! The confidence of each pixel by itself: see [`Stage::Confidence`](crate::backend::Stage::Confidence).
+//! The lead of each pixel's label: see [`Stage::Confidence`](crate::backend::Stage::Confidence).
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};

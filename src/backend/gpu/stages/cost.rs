@@ -1,7 +1,8 @@
 //! Matching cost: see [`Stage::Cost`](crate::backend::Stage::Cost).
 //!
-//! Floor: `census` moves 52 bytes a pixel at 2,500 operations, and asks for 2,000, the 63 places of the window in both images;
-//! `ad_census` moves 1 byte a label at 100 operations for four, and asks for 32, the right row once a label.
+//! Lower bound: `census` moves 52 bytes per pixel with 2,500 operations, and requests 2,000 (the 63 places of the window in
+//! both images); `ad_census` moves 1 byte per label with 100 operations for four, and requests 32 (the right row for each
+//! label).
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -15,7 +16,7 @@ use crate::program::together::BAND;
 use crate::stage::{Data, Volume};
 use std::ops::Range;
 
-/// Pixels of a row that share an invocation of `sad`.
+/// Pixels of a row per invocation of `sad`.
 const SAD_RUN: u32 = 8;
 
 shader! {
@@ -34,7 +35,7 @@ shader! {
     };
 }
 
-/// Rows of the window of absolute differences on either side of a pixel.
+/// Vertical radius of the window of absolute differences.
 fn radius(plan: &Plan) -> u32 {
     plan.method.cost.sad_window / 2
 }
@@ -66,7 +67,7 @@ impl Uniform {
     }
 }
 
-/// What is taken of both views, and costs where all rows of these are held.
+/// Computes the features of both views, and the costs if all rows of these are held.
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (plan, width) = (r.plan, r.params().width);
     if takes_census(plan) {
@@ -75,7 +76,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     if plan.holds_all_rows() { record_costs(r) } else { Ok(()) }
 }
 
-/// Costs from both views and what [`record`] has taken of them.
+/// Computes costs from both views and their features.
 pub(super) fn record_costs(r: &mut Recorder) -> Result<()> {
     let (plan, l) = (r.plan, r.params());
     if takes_census(plan) {
@@ -87,8 +88,8 @@ pub(super) fn record_costs(r: &mut Recorder) -> Result<()> {
     Ok(())
 }
 
-/// Goes down level 0 where not all of its rows are held: `then` gets some rows after the other, once the costs of these and of
-/// `around` more on either side are there.
+/// Processes level 0 in bands if not all its rows are held. Before each call of `then`, computes the costs of
+/// its rows and of `around` more on either side.
 pub(super) fn record_as_needed(
     r: &mut Recorder,
     around: u32,
@@ -99,7 +100,7 @@ pub(super) fn record_as_needed(
     for start in (0..height).step_by(BAND) {
         let rows = start..(start + BAND as u32).min(height);
         let end = (rows.end + around).min(height);
-        // The last few rows may have been around those before.
+        // Rows near the end may already be computed.
         if computed < end {
             r.at(0, computed..end, record_costs)?;
             computed = end;

@@ -1,7 +1,7 @@
 //! Messages of the dependency factors: see [`Stage::Dependency`](crate::backend::Stage::Dependency).
 //!
-//! Floor, a label and three members: 7 bytes moved, 15 asked for (the beliefs of three members, all of it again after the
-//! minimum), 50 operations for four labels.
+//! Lower bound per label, with three members: 7 bytes moved, 15 requested (the beliefs of three members, all
+//! again after the minimum), 50 operations for four labels.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -31,7 +31,7 @@ shader! {
     };
 }
 
-/// The uniform of `level`. A step that costs as much as any disagreement is none.
+/// The uniform of `level`. A step that costs as much as any disagreement has no effect.
 fn uniform(plan: &Plan, level: usize) -> Uniform {
     let tau = plan.dependency.tau;
     Uniform { tau: tau.into(), step: plan.label_step(level).unwrap_or(tau).into() }
@@ -44,10 +44,10 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     Ok(())
 }
 
-/// The same for all of `levels` at once.
+/// Like `record`, in one dispatch for all `levels`.
 pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
     let (plan, buffers) = (r.plan, r.buffers);
     let own = |z: usize| (uniform(plan, z), buffers.levels[z].width);
-    // The coarsest has steps wherever another one has.
+    // The coarsest level has a step if any other one has.
     r.levels(&main(plan, levels.end - 1), levels, own)
 }

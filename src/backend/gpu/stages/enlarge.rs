@@ -1,6 +1,6 @@
-//! The maps at full size: see [`Stage::Enlarge`](crate::backend::Stage::Enlarge).
+//! Upsampled maps: see [`Stage::Enlarge`](crate::backend::Stage::Enlarge).
 //!
-//! Floor, a pixel of half the size: 110 bytes moved; 900 bytes asked for and 800 operations for its four pixels.
+//! Lower bound per half-size pixel: 110 bytes moved; 900 bytes requested and 800 operations for its four pixels.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};

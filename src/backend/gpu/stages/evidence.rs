@@ -1,6 +1,6 @@
 //! Evidence and the first beliefs: see [`Stage::Evidence`](crate::backend::Stage::Evidence).
 //!
-//! Floor, a label: 3 bytes moved, 4 asked for (the costs twice, for their minimum), 25 operations for four.
+//! Lower bound for four labels: 12 bytes moved, 16 requested (the costs twice, for their minimum), 25 operations.
 
 use super::cost;
 use crate::backend::gpu::commands::Recorder;
@@ -28,7 +28,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         cap: scale.cap.into(),
     };
     if r.level == 0 && !r.plan.holds_all_rows() {
-        // These rows take the place of others, whose messages go.
+        // These rows replace others, whose messages are discarded.
         cost::record_costs(r)?;
         r.clear(Data::Volume(Volume::Dependency(0)));
         if Volume::Down(0).is_there(r.plan.levels.len()) {

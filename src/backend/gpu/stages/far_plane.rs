@@ -1,4 +1,4 @@
-//! Planes from far away: see [`Stage::FarPlane`](crate::backend::Stage::FarPlane).
+//! Planes over any distance: see [`Stage::FarPlane`](crate::backend::Stage::FarPlane).
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -58,7 +58,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (across, down) = (across as u32, down as u32);
     let pitch = Data::Patches.array(plan).words as u32;
     let own = Uniform { across, down, pitch, ..Uniform::default() };
-    // Along columns, a band also sees the row that it goes on from.
+    // Along columns, a band also reads the adjacent row from which it continues.
     let [gathered, sunk] = [gather(plan, 0).any(), sink(plan, 0).any()];
     let bands = r.bands_of(&[(&gathered, 0), (&sunk, 0)], usize::MAX)?;
     for round in 0..PATCH_ROUNDS {

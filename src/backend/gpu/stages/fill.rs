@@ -1,4 +1,4 @@
-//! Disparities for what is invalid: see [`Stage::Fill`](crate::backend::Stage::Fill).
+//! Fills invalid pixels: see [`Stage::Fill`](crate::backend::Stage::Fill).
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -20,7 +20,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let none = Uniform::default();
     r.one_a_row(&rows(plan, 0), &none)?;
     r.dispatch(&sources(plan, 0), &none, 0..l.height, (l.height, 1))?;
-    // A row may take its values from any other: every band from every band.
+    // A row may take its values from any other, so each band is filled from every band.
     for source in r.bands_of(&[(&fill(plan, 0).any(), 0)], usize::MAX)? {
         let own = Uniform {
             source_first_row: source.start,

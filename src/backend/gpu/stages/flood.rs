@@ -1,7 +1,7 @@
-//! One sweep of a level: see [`Stage::Flood`](crate::backend::Stage::Flood).
+//! One iteration within a level: see [`Stage::Flood`](crate::backend::Stage::Flood).
 //!
-//! A device goes over all pixels at once, so it gains nothing by going over messages and beliefs together: the stage has no
-//! shader of its own.
+//! A device processes all pixels at once, so it gains nothing from computing messages and beliefs together:
+//! the stage has no shader of its own.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::Kernel;

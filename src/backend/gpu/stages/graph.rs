@@ -10,7 +10,7 @@ use crate::plan::{GRAPH_WINDOW, Plan};
 use crate::stage::Data;
 use std::ops::Range;
 
-/// Neighbours that `choose` finds in one pass over the window, at most.
+/// Largest number of neighbours that `choose` finds in one pass over the window.
 const CHOSEN: usize = 8;
 /// Places of the window besides the centre.
 const PLACES: usize = GRAPH_WINDOW * GRAPH_WINDOW - 1;
@@ -67,7 +67,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     record_transposed(r)
 }
 
-/// The same for all of `levels` at once, but for their guides.
+/// Like `record`, with one dispatch for all `levels`, except for their guides.
 pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
     for z in levels.clone() {
         r.level = z;
@@ -86,7 +86,7 @@ pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()
     Ok(())
 }
 
-/// Makes the guide of the level from that of the next finer one.
+/// Computes the guide of the level from the next finer one.
 fn record_guide(r: &mut Recorder) -> Result<()> {
     if r.level == 0 {
         return Ok(());
@@ -99,7 +99,7 @@ fn record_guide(r: &mut Recorder) -> Result<()> {
     Ok(())
 }
 
-/// Finds for every pixel the factors that hold it.
+/// Finds the factors that hold each pixel.
 pub(super) fn record_transposed(r: &mut Recorder) -> Result<()> {
     r.renew(Data::Members(r.level));
     if r.plan.neighbours == 0 {

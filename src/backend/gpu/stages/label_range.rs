@@ -1,4 +1,4 @@
-//! Costs outside the label range of their pixel: see [`Stage::LabelRange`](crate::backend::Stage::LabelRange).
+//! Limits costs to label ranges: see [`Stage::LabelRange`](crate::backend::Stage::LabelRange).
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};

@@ -1,6 +1,6 @@
 //! Label windows: see [`Stage::LabelWindow`](crate::backend::Stage::LabelWindow).
 //!
-//! Windows that hold all labels are there from the start.
+//! Windows with all labels are uploaded once, so they need no shader.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -23,7 +23,7 @@ shader! {
     };
 }
 
-/// Whether the windows of `level` hold the label ranges.
+/// Whether the windows of `level` are those of the label ranges.
 fn limited(plan: &Plan, level: usize) -> bool {
     plan.limits_labels() && !plan.windows_follow_beliefs(level)
 }

@@ -1,4 +1,4 @@
-//! What the right view says of each pixel: see [`Stage::LeftRightCheck`](crate::backend::Stage::LeftRightCheck).
+//! The left-right check: see [`Stage::LeftRightCheck`](crate::backend::Stage::LeftRightCheck).
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};

@@ -1,6 +1,6 @@
 //! The weighted median: see [`Stage::Median`](crate::backend::Stage::Median).
 //!
-//! Floor, a pixel: 28 bytes moved; in each of up to nine passes 3,000 bytes asked for (the 105 places) and 2,500 operations.
+//! Lower bound per pixel: 28 bytes moved; in up to nine passes 3,000 bytes requested (105 places), 2,500 operations.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Kernel, Variant};
@@ -34,14 +34,14 @@ pub(super) fn kernels(plan: &Plan, _: usize) -> Vec<Kernel> {
     vec![kernel(&MedianWeights::of(&plan.method)).any()]
 }
 
-/// A `shader` that imports the weighted median and goes over a window with `weights` so many times `more`.
+/// The kernel of a `shader` with the weighted median and `more` extra passes over a window with `weights`.
 pub(super) fn over_window(
     shader: Shader,
     weights: &MedianWeights,
     more: usize,
     specialised: impl Fn(Variant) -> Variant,
 ) -> Kernel<Uniform> {
-    // One pass, and one for every three bits of what the disparities of a window may span.
+    // One pass, and one for every three bits of the range of disparities in a window.
     let passes = 1 + 8 + more;
     let window = 2 * weights.radius + 1;
     let every = 1 + u32::from(weights.checkered);

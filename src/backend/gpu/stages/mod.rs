@@ -1,4 +1,4 @@
-//! The stages on a device: of each, the file of its name.
+//! The stages on a device, each in the file of its name.
 
 mod upload;
 
@@ -23,7 +23,7 @@ macro_rules! declare {
         $( mod $finest_row_name; )*
         $( mod $map_name; )*
 
-        /// What `stage` runs of its shader, for `plan`, without a device.
+        /// The kernels of `stage` for `plan`; needs no device.
         #[must_use]
         pub fn kernels(stage: Stage, plan: &Plan) -> Vec<Kernel> {
             match stage {
@@ -49,16 +49,16 @@ macro_rules! declare {
 
 crate::for_every_stage!(declare);
 
-/// What a match by `plan` may run, beside the [`kernels`] of its stages.
+/// The kernels of a match by `plan` that belong to no stage.
 #[must_use]
 pub fn other_kernels(plan: &Plan) -> Vec<Kernel> {
     upload::kernels(plan, 0)
 }
 
-/// Records a stage at several levels at once.
+/// Records a stage for several levels at once.
 pub(super) type RecordLevels = fn(&mut Recorder, Range<usize>) -> Result<()>;
 
-/// The stages that can go over several levels in one dispatch, by name.
+/// The stages that can process several levels in one dispatch, by name.
 const OVER_LEVELS: [(&str, RecordLevels); 4] = [
     ("graph", graph::record_levels),
     ("dependency", dependency::record_levels),
@@ -66,17 +66,17 @@ const OVER_LEVELS: [(&str, RecordLevels); 4] = [
     ("belief", belief::record_levels),
 ];
 
-/// How `stage` goes over levels at once, where it can.
+/// The function that records `stage` for several levels at once, if there is one.
 pub(super) fn record_levels(stage: Stage) -> Option<RecordLevels> {
     OVER_LEVELS.into_iter().find(|(name, _)| *name == stage.name()).map(|(_, record)| record)
 }
 
-/// Records how the words of a pair are taken apart.
+/// Records the unpacking of the uploaded pair.
 pub(super) fn record_upload(r: &mut Recorder) -> Result<()> {
     upload::record(r)
 }
 
-/// Records how the factors that hold each pixel are found.
+/// Records the transposition of the graph: the factors that hold each pixel.
 pub(super) fn record_transposed(r: &mut Recorder) -> Result<()> {
     graph::record_transposed(r)
 }

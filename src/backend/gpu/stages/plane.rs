@@ -1,6 +1,6 @@
 //! Planes through the disparities: see [`Stage::Plane`](crate::backend::Stage::Plane).
 //!
-//! Floor, a pixel: half of that of the median, and in each of two rounds 1,500 bytes asked for (53 places) and 2,500 operations.
+//! Lower bound per pixel: half of the median's, and in two rounds 1,500 bytes requested (53 places), 2,500 operations.
 
 use super::median;
 use crate::backend::gpu::commands::Recorder;
@@ -13,7 +13,7 @@ use crate::weights::MedianWeights;
 
 const SHADER: Shader = Shader::new("plane", "main", include_str!("../../../../shaders/plane.wgsl"));
 
-/// The kernel for a window with `weights`. It binds what the median does.
+/// The kernel for a window with `weights`. It has the bindings of the median.
 pub(super) fn kernel(weights: &MedianWeights) -> Kernel<median::Uniform> {
     median::over_window(SHADER, weights, PLANE_BITS.len(), |variant| {
         variant

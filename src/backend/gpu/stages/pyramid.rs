@@ -1,6 +1,6 @@
 //! Costs of the coarser levels: see [`Stage::Pyramid`](crate::backend::Stage::Pyramid).
 //!
-//! Floor, for a fine label of level 1: 1 + 2/8 bytes moved, 31 asked for (the 5 x 5 window), 100 operations for four labels.
+//! Lower bound for four fine labels of level 1: 5 bytes moved, 124 requested (5 x 5 window), 100 operations.
 
 use super::cost;
 use crate::backend::gpu::commands::Recorder;
@@ -23,7 +23,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     cost::record_as_needed(r, 2, |r, fine| r.at(1, fine.start / 2..fine.end.div_ceil(2), record_rows))
 }
 
-/// From costs that are there.
+/// Records rows whose fine costs are computed.
 fn record_rows(r: &mut Recorder) -> Result<()> {
     let (z, l) = (r.level, r.params());
     let own = Uniform { fine: r.buffers.levels[z - 1], label_offset: r.plan.label_offset(z) };

@@ -1,7 +1,7 @@
-//! Disparities of half-size pixels by the full size: see [`Stage::Refine`](crate::backend::Stage::Refine).
+//! Refines disparities at full size: see [`Stage::Refine`](crate::backend::Stage::Refine).
 //!
-//! Floor, a pixel of half the size: 150 bytes moved; 700 bytes asked for and 1,000 operations for the census of four pixels of both
-//! views and their costs, 400 bytes and 300 operations for the fit.
+//! Lower bound per half-size pixel: 150 bytes moved; 700 bytes requested and 1,000 operations for the census
+//! of four pixels of both views and their costs, 400 bytes and 300 operations for the fit.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -18,7 +18,7 @@ shader! {
     fit { optima around 1, block_costs around 1, raw, disparity } => variant(3 * (2 * COLUMNS + 2) + REACH);
 }
 
-// The shader finds the costs of a disparity in fixed bits of its words.
+// The shader relies on the positions of costs in fixed bits of its words.
 const _: () = assert!(REACH == 4 && NEAR == 1);
 
 fn variant(loops: usize) -> Variant {

@@ -1,7 +1,7 @@
 //! Messages between two levels: see [`Stage::Resolution`](crate::backend::Stage::Resolution).
 //!
-//! Floor, for a fine label of level 1: 3 + 3/8 bytes moved, 5.6 asked for (all that is read again after the minimum), 100 operations
-//! for four labels.
+//! Lower bound per fine label of level 1: 3 + 3/8 bytes moved, 5.6 requested (all data again after the
+//! minimum), 100 operations for four labels.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -39,7 +39,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     r.rows(&main(r.plan, r.level), &Uniform::of(r, r.level), width)
 }
 
-/// The same for all of `levels` at once.
+/// Like `record`, in one dispatch for all `levels`.
 pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
     let own = levels.clone().map(|z| {
         let (fine, (fine_at, _)) = r.buffers.shared_params(r.plan, z - 1);

@@ -1,6 +1,6 @@
 //! The map of the right view: see [`Stage::RightView`](crate::backend::Stage::RightView).
 //!
-//! Floor, a label: 1 byte moved, 4 asked for (words of four labels of which it wants one), 20 operations for four.
+//! Lower bound for four labels: 4 bytes moved, 16 requested (words of four labels, one used), 20 operations.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -11,7 +11,7 @@ shader! {
     main { belief, right_labels } => Variant::new(plan.levels[0].labels).of_width(plan.volume_width);
 }
 
-/// The tile decides which columns count, so each tile has its own steps.
+/// The columns depend on the core of the tile, so each tile has its own commands.
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (core, width) = (&r.plan.core, r.params().width);
     let own = Uniform { first_column: core.start as u32, columns: core.len() as u32 };

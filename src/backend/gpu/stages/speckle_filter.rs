@@ -1,6 +1,6 @@
-//! Ties, and regions too small to be trusted: see [`Stage::SpeckleFilter`](crate::backend::Stage::SpeckleFilter).
+//! Flags ties and small regions: see [`Stage::SpeckleFilter`](crate::backend::Stage::SpeckleFilter).
 //!
-//! Regions are found anew in every band, among its rows and so many around it that a region which leaves them is large enough.
+//! Regions are found separately for every band, in its rows and enough around it that a region which leaves them is large.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -8,10 +8,10 @@ use crate::backend::gpu::rows::with_halo;
 use crate::error::Result;
 use crate::plan::Plan;
 
-/// Pixels of a segment of a row.
+/// Pixels per segment of a row.
 const SEGMENT: u32 = 64;
-/// Pixels on one side of the borders along which blocks of rows are joined in one go: it bounds the chains that the shader
-/// follows.
+/// Pixels on one side of the borders along which blocks of rows are joined in one dispatch; bounds the length
+/// of chains that the shader follows.
 const JOINED_PIXELS: u32 = 4096;
 
 shader! {
@@ -19,7 +19,7 @@ shader! {
         halo: u32, span: u32, blocks: u32, first_column: u32, columns: u32, size: u32
     }
     runs { optima, flags, parents, sizes } => variant(SEGMENT as usize);
-    // Followed from two pixels.
+    // Two chains are followed.
     join { optima, parents } => variant(4 * chain(plan) + 8);
     flatten { parents } => variant(2 * chain(plan) + 4);
     count { parents, sizes } => variant(0);
@@ -30,7 +30,7 @@ fn variant(loops: usize) -> Variant {
     Variant::new(loops).with("SEGMENT", SEGMENT)
 }
 
-/// How many rows around its own a band looks at.
+/// Number of rows around its own that a band reads.
 fn size(plan: &Plan) -> u32 {
     plan.method.refinement.speckle_size
 }
@@ -40,7 +40,7 @@ fn chain(plan: &Plan) -> usize {
     (JOINED_PIXELS as usize).max(plan.levels[0].width / SEGMENT as usize)
 }
 
-/// How many blocks of rows become one in one go, and in which columns: as many as the image's `width` leaves room for.
+/// (blocks of rows to join at a time, columns to join them in), limited by the `width` of the image.
 fn joined(width: u32) -> (u32, u32) {
     let fits = |blocks: &u32| width <= JOINED_PIXELS / (blocks - 1);
     let blocks = [8, 4].into_iter().find(fits).unwrap_or(2);
@@ -65,7 +65,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         for span in (0..).map(|k| blocks.pow(k)).take_while(|&span| span < height) {
             for first_column in (0..l.width).step_by(most_columns as usize) {
                 let columns = most_columns.min(l.width - first_column);
-                // The last blocks may have fewer borders; the shader leaves those out that are not there.
+                // The last blocks may have fewer borders; the shader skips missing ones.
                 let borders = height.div_ceil(blocks * span) * (blocks - 1);
                 let own = Uniform { span, first_column, columns, ..base };
                 r.dispatch(&join, &own, seen.clone(), (columns, borders))?;

@@ -1,4 +1,4 @@
-//! Disparities between the labels: see [`Stage::SubPixel`](crate::backend::Stage::SubPixel).
+//! Sub-pixel disparities: see [`Stage::SubPixel`](crate::backend::Stage::SubPixel).
 
 use super::cost;
 use crate::backend::gpu::commands::Recorder;

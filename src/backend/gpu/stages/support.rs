@@ -1,6 +1,6 @@
-//! The confidence that the pixels around a pixel support: see [`Stage::Support`](crate::backend::Stage::Support).
+//! The support of each pixel: see [`Stage::Support`](crate::backend::Stage::Support).
 //!
-//! Floor, a pixel: 20 bytes moved, 200 asked for (25 places), 130 operations.
+//! Lower bound per pixel: 20 bytes moved, 200 requested (25 places), 130 operations.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};

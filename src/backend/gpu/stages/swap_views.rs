@@ -1,6 +1,6 @@
-//! The right view in place of the left one: see [`Stage::SwapViews`](crate::backend::Stage::SwapViews).
+//! Exchanges the views: see [`Stage::SwapViews`](crate::backend::Stage::SwapViews).
 //!
-//! Floor: 88 bytes moved and asked for a pixel.
+//! Lower bound per pixel: 88 bytes moved and requested.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};

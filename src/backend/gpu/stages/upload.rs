@@ -1,4 +1,4 @@
-//! The pair on its way to the device: images of whole 8-bit levels go up in one word a pixel, and the device takes these apart.
+//! Unpacks uploaded images: those in whole 8-bit levels are uploaded as one word per pixel.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
@@ -9,7 +9,7 @@ shader! {
     main { left_words, right_words, left, right } => Variant::new(0);
 }
 
-/// Takes the words of the pair apart.
+/// Unpacks the words of the pair.
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let width = r.params().width;
     r.rows(&main(r.plan, 0), &Uniform {}, width)

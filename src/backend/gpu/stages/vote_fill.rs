@@ -1,6 +1,6 @@
-//! Votes on what was filled: see [`Stage::VoteFill`](crate::backend::Stage::VoteFill).
+//! Fills by votes: see [`Stage::VoteFill`](crate::backend::Stage::VoteFill).
 //!
-//! The sums of a band of half-size rows are there at a time, with those of the rows around it that its columns reach.
+//! Sums exist for one band of half-size rows at a time, and for the rows around it in reach of its columns.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};

@@ -1,6 +1,6 @@
-//! The optimum of every pixel: see [`Stage::WinnerTakesAll`](crate::backend::Stage::WinnerTakesAll).
+//! The optimum of each pixel's beliefs: see [`Stage::WinnerTakesAll`](crate::backend::Stage::WinnerTakesAll).
 //!
-//! Floor, a label: 1 byte moved, 2 asked for (the beliefs again, for the runner-up), 15 operations for four.
+//! Lower bound for four labels: 4 bytes moved, 8 requested (again for the runner-up), 15 operations.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};

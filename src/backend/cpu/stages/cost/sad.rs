@@ -1,7 +1,8 @@
-//! The matching cost by sums of absolute differences, in running sums.
+//! The matching cost by sums of absolute differences, as running sums.
 //!
-//! Every thread goes down a band of rows. It keeps the sums over the window's rows for each column and label: the row that
-//! enters the window is added, the one that leaves it is taken off. Along a row, these sums are added up in the same way.
+//! Every thread processes bands of rows from the top. It keeps the sums over the window's rows for each
+//! column and label: it adds the row that enters the window and subtracts the row that leaves. Along a row,
+//! it sums the columns in the same way.
 
 use crate::backend::cpu::units::{block, block_mut, each_lane, padding};
 use crate::image::{Image, Pair, Pixel};
@@ -10,7 +11,7 @@ use crate::threads::prelude::*;
 
 /// Bands per thread, so that one slow thread does not delay all others.
 const BANDS: usize = 4;
-/// Smallest number of rows of a band, in windows: each band starts by summing a whole one.
+/// Smallest height of a band, in windows, because each band starts by summing a whole window.
 const LEAST_WINDOWS: usize = 4;
 
 /// The costs of all pixels, \[y\]\[x\]\[label\], with padding.
@@ -23,7 +24,7 @@ pub(super) fn costs(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     out.par_chunks_mut(rows * row_cells).enumerate().for_each(|(i, out)| {
         let (first, radius) = (i * rows, window / 2);
         let (above, end) = (first.saturating_sub(radius), first + out.len() / row_cells);
-        // The window's rows of the right view, and the one that leaves it.
+        // The window's rows of the right view, and the row that leaves it.
         let mut held = vec![Row::new(level); window + 1];
         let mut columns = Columns::new(level, window);
         let mut out = out.chunks_exact_mut(row_cells);
@@ -42,7 +43,7 @@ pub(super) fn costs(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     });
 }
 
-/// A row enters the window, another one leaves it, and the costs of the one between them follow.
+/// Adds the row that enters the window, subtracts the one that leaves, and computes the centre row.
 #[pulp::with_simd(step = crate::vectors::widest())]
 #[inline(always)]
 fn step_on<'a, S: pulp::Simd>(
@@ -53,7 +54,7 @@ fn step_on<'a, S: pulp::Simd>(
     mut costs: Option<(Views<'a>, &'a mut [u8])>,
     means: &'a Means,
 ) {
-    // Block by block: the columns of one stay in the cache.
+    // Block by block, so that the columns of one stay in the cache.
     for (i, sums) in columns.blocks.iter_mut().enumerate() {
         let at = i * LABEL_BLOCK;
         let inside = &mut sums[columns.margin..];
@@ -72,7 +73,7 @@ fn step_on<'a, S: pulp::Simd>(
 /// A block of labels.
 type Block<T> = [T; LABEL_BLOCK];
 
-/// Sums of a block of labels: of the differences, and the number of pairs of pixels that they are from.
+/// For a block of labels, the sums of differences and the numbers of pixel pairs.
 #[derive(Clone, Copy, Default)]
 struct Sum {
     differences: Block<u32>,
@@ -97,9 +98,9 @@ impl Sum {
     }
 }
 
-/// The sums over the rows of the window.
+/// Sums over the rows of the window.
 struct Columns {
-    /// Columns of 0 before the first one; there is one less behind the last.
+    /// Zero columns before the first column; after the last there is one less.
     margin: usize,
     /// \[block of labels\]\[column\].
     blocks: Vec<Vec<Sum>>,
@@ -112,13 +113,13 @@ impl Columns {
     }
 }
 
-/// A row of the right view from right to left, so that ascending labels are side by side, with as many pixels more at either end as
-/// there are labels.
+/// A mirrored row of the right view, so that ascending labels are adjacent, with a margin of as many pixels
+/// as labels at either end.
 #[derive(Clone)]
 struct Row {
     margin: usize,
     channels: [Vec<u16>; 3],
-    /// All bits are set where a pixel is inside and unmasked.
+    /// All bits are set for unmasked pixels inside.
     seen: Vec<u16>,
 }
 
@@ -152,14 +153,14 @@ struct Views<'a> {
 }
 
 impl Views<'_> {
-    /// Where the right pixels of the labels of left column `x` start. Those of columns that have none are all in the margin.
+    /// Index of the first right pixel, by label, of left column `x`; all are in the margin if there are none.
     #[inline(always)]
     fn place(&self, x: usize) -> usize {
         let (width, margin) = (self.level.width as i64, self.right.margin as i64);
         (margin + (width - 1 - x as i64 + i64::from(self.level.min)).clamp(-margin, width)) as usize
     }
 
-    /// Changes the sum of each column by the differences of its pixel at the block of labels at `at`.
+    /// Applies `change` to each column's sum, with its pixel's differences at the block of labels at `at`.
     #[inline(always)]
     fn each_difference(&self, at: usize, sums: &mut [Sum], change: impl Fn(&Sum, &Sum) -> Sum) {
         let pixels = self.left.pixels.row(self.y).iter().zip(self.left.masked.row(self.y));
@@ -170,7 +171,7 @@ impl Views<'_> {
         }
     }
 
-    /// The differences of a left pixel from the right ones from `place` on.
+    /// The differences of a left pixel from the right pixels from `place` on.
     #[inline(always)]
     fn difference(&self, pixel: Pixel, place: usize) -> Sum {
         let seen: Block<u16> = *block(&self.right.seen, place);
@@ -185,7 +186,7 @@ impl Views<'_> {
     }
 }
 
-/// The costs of a row at the block of labels at `at`, from the sums of the columns.
+/// The costs of a row at the block of labels at `at`, from the column sums.
 #[inline(always)]
 fn cost_block(views: &Views, at: usize, columns: &[Sum], margin: usize, means: &Means, costs: &mut [u8]) {
     let padding: Block<u8> = *block(&means.padding, at);
@@ -203,9 +204,9 @@ fn cost_block(views: &Views, at: usize, columns: &[Sum], margin: usize, means: &
     }
 }
 
-/// What costs are computed with from sums.
+/// Constants to compute costs from sums.
 struct Means {
-    /// 2^32 / 3 n, rounded up, for each number n of pairs of pixels; 0 for none.
+    /// 2^32 / 3 n, rounded up, for each number n of pixel pairs; 0 for n = 0.
     reciprocals: Vec<u32>,
     /// The cost of labels outside the right image.
     outside: u8,
@@ -229,7 +230,7 @@ impl Means {
     #[inline(always)]
     fn of(&self, sum: &Sum) -> Block<u16> {
         let (pairs, differences) = (&sum.pairs, &sum.differences);
-        // Mostly all labels have the same number of pairs, and the reciprocal is a constant.
+        // Usually all labels have the same number of pairs, and the reciprocal is constant.
         let first = pairs[0];
         if *pairs == [first; LABEL_BLOCK] {
             let reciprocal = self.reciprocals[usize::from(first)];
@@ -240,8 +241,8 @@ impl Means {
     }
 }
 
-/// round(`sum` / 768 `pairs`), at most [`COST_MAX`]. The quotient is the upper half of a product: it is exact, as up to 961 pairs and
-/// a quotient of 255 the error of the reciprocal adds up to less than 1 / 3 n.
+/// round(`sum` / 768 `pairs`), at most [`COST_MAX`], by the upper half of a product. It is exact: up to 961
+/// pairs and a quotient of 255, the error of the reciprocal adds up to less than 1 / 3 n.
 #[inline(always)]
 fn mean(sum: u32, pairs: u16, reciprocal: u32) -> u16 {
     const MOST: u32 = COST_MAX as u32 + 1;
