@@ -364,7 +364,7 @@ impl Plan {
     /// Whether the texture zones limit the labels of their pixels.
     #[must_use]
     pub fn limits_labels(&self) -> bool {
-        self.method.front.zone_sigmas > 0.0
+        self.method.front.limits_labels()
     }
 
     /// The largest sum of squared changes, over all pixels of the finest level, at which its map has settled; `None` where message
