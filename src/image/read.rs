@@ -262,6 +262,20 @@ impl Reader {
     }
 }
 
+impl Raster<'_> {
+    /// Prepends the name of its file to the doubt.
+    pub(super) fn named(self, file: &Path) -> Self {
+        Self { doubt: self.doubt.map(|doubt| format!("{}: {doubt}", file.display())), ..self }
+    }
+
+    /// Applies `f` to the grey or colour samples of each pixel.
+    fn plane<S, T>(&self, samples: &[S], f: impl Fn(&[S]) -> T) -> Plane<T> {
+        let colours = self.colours();
+        let values = samples.chunks_exact(self.channels).map(|pixel| f(&pixel[..colours])).collect();
+        Plane::new(self.width, self.height, values)
+    }
+}
+
 impl Pair {
     /// Reads a rectified pair from two files, like [`Reader::pair`].
     ///
