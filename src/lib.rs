@@ -92,11 +92,14 @@
 #![forbid(unsafe_code)]
 
 mod backend;
+#[cfg(feature = "cameras")]
 pub mod calibration;
 pub mod colour;
+#[cfg(feature = "cameras")]
 pub mod depth;
 mod engine;
 pub mod error;
+#[cfg(feature = "evaluation")]
 pub mod evaluation;
 mod front;
 mod graph;
@@ -110,8 +113,10 @@ mod pause;
 mod plan;
 mod process;
 mod program;
+#[cfg(feature = "cameras")]
 pub mod rectification;
 pub mod region;
+#[cfg(feature = "cameras")]
 mod registration;
 #[doc(hidden)]
 pub mod remedy;
@@ -128,6 +133,7 @@ mod weights;
 pub use error::{Error, Result};
 pub use front::check;
 pub use front::conditioning::Conditioning;
+#[cfg(feature = "cameras")]
 pub use front::drift;
 pub use image::Pair;
 #[cfg(not(target_arch = "wasm32"))]
