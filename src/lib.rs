@@ -88,6 +88,16 @@
 //!
 //! Beliefs, messages and evidence are costs in integers (see [`low_level::plan`]), so the CPU path and every GPU give the same
 //! maps bit for bit, whatever the number of threads.
+//!
+//! # Features
+//!
+//! All but the last are on by default. Without any, the matcher takes frames in memory and gives maps, and a third fewer packages.
+//!
+//! - `files`: images and maps in files, and methods in TOML (`Method::load`, `Method::set`, `Method::table`).
+//! - `cameras`: [`calibration`], [`rectification`], [`depth`] and [`drift`], and clouds of points. It takes `files`.
+//! - `evaluation`: [`evaluation`].
+//! - `paper`: the presets `paper` and `fgs`, with texture zones and the correction of the illumination, which they alone use.
+//! - `las`: clouds of points as LAS and LAZ. It takes `cameras`.
 
 #![forbid(unsafe_code)]
 
