@@ -26,6 +26,7 @@
             src = self;
             cargoLock.lockFile = ./Cargo.lock;
             buildAndTestSubdir = "cli";
+            buildFeatures = [ "live" ];
             # The tests take a driver and all processors; `checks` makes a map.
             doCheck = false;
             nativeBuildInputs = [ pkgs.installShellFiles ];

@@ -12,8 +12,9 @@ PROGRAM = Path(os.environ.get("MRFGS") or TARGET / "release" / "mrfgs")
 
 
 def build(script):
-    """Builds the program, unless the environment variable MRFGS names one."""
-    if not os.environ.get("MRFGS") and subprocess.run(["cargo", "build", "--release", "--locked", "--quiet"], cwd=ROOT).returncode != 0:
+    """Builds the program as packages have it, unless the environment variable MRFGS names one."""
+    line = ["cargo", "build", "--release", "--locked", "--quiet", "--features", "mrfgs-cli/live"]
+    if not os.environ.get("MRFGS") and subprocess.run(line, cwd=ROOT).returncode != 0:
         sys.exit(f"{script}: cannot build mrfgs")
 
 

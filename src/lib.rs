@@ -88,15 +88,28 @@
 //!
 //! Beliefs, messages and evidence are costs in integers (see [`low_level::plan`]), so the CPU path and every GPU give the same
 //! maps bit for bit, whatever the number of threads.
+//!
+//! # Features
+//!
+//! All but the last are on by default. Without any, the matcher takes frames in memory and gives maps, and a third fewer packages.
+//!
+//! - `files`: images and maps in files, and methods in TOML (`Method::load`, `Method::set`, `Method::table`).
+//! - `cameras`: [`calibration`], [`rectification`], [`depth`] and [`drift`], and clouds of points. It takes `files`.
+//! - `evaluation`: [`evaluation`].
+//! - `paper`: the presets `paper` and `fgs`, with texture zones and the correction of the illumination, which they alone use.
+//! - `las`: clouds of points as LAS and LAZ. It takes `cameras`.
 
 #![forbid(unsafe_code)]
 
 mod backend;
+#[cfg(feature = "cameras")]
 pub mod calibration;
 pub mod colour;
+#[cfg(feature = "cameras")]
 pub mod depth;
 mod engine;
 pub mod error;
+#[cfg(feature = "evaluation")]
 pub mod evaluation;
 mod front;
 mod graph;
@@ -110,8 +123,10 @@ mod pause;
 mod plan;
 mod process;
 mod program;
+#[cfg(feature = "cameras")]
 pub mod rectification;
 pub mod region;
+#[cfg(feature = "cameras")]
 mod registration;
 #[doc(hidden)]
 pub mod remedy;
@@ -128,6 +143,7 @@ mod weights;
 pub use error::{Error, Result};
 pub use front::check;
 pub use front::conditioning::Conditioning;
+#[cfg(feature = "cameras")]
 pub use front::drift;
 pub use image::Pair;
 #[cfg(not(target_arch = "wasm32"))]

@@ -1,9 +1,12 @@
 //! The memory of the machine, and allocations that can fail.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+#[cfg(feature = "files")]
+mod claims;
+
+#[cfg(feature = "files")]
+pub(crate) use claims::Claim;
 
 use crate::error::{MemoryError, Purpose, Result};
-use crate::process::PerProcess;
 
 /// Bytes that are available without swapping, if the system tells.
 #[cfg(not(target_arch = "wasm32"))]
@@ -39,33 +42,6 @@ pub(crate) fn check(bytes: u64, purpose: Purpose) -> Result<(), MemoryError> {
     Vec::<u8>::new().try_reserve_exact(with_heap).map_err(|_| lacking(bytes, purpose))
 }
 
-/// Bytes that are claimed at present.
-static CLAIMED: PerProcess<AtomicU64> = PerProcess::new();
-
-/// Memory that an operation takes step by step during the life of the claim. Other claims do not count on it.
-pub(crate) struct Claim(u64);
-
-impl Claim {
-    /// Claims `bytes` for work on an image.
-    ///
-    /// # Errors
-    /// The errors of [`check`], for this claim and for the sum of all claims.
-    pub(crate) fn new(bytes: u64) -> Result<Self, MemoryError> {
-        // Check the claim by itself first, so that the error of one that is too large never depends on others.
-        check(bytes, Purpose::Image)?;
-        let claim = Self(bytes);
-        let others = CLAIMED.get().fetch_add(bytes, Ordering::Relaxed);
-        // On failure, dropping the claim subtracts it.
-        check(others.saturating_add(bytes), Purpose::Image).map(|()| claim)
-    }
-}
-
-impl Drop for Claim {
-    fn drop(&mut self) {
-        CLAIMED.get().fetch_sub(self.0, Ordering::Relaxed);
-    }
-}
-
 fn lacking(bytes: u64, purpose: Purpose) -> MemoryError {
     MemoryError::Machine { needed: bytes, available: None, purpose }
 }
@@ -85,6 +61,7 @@ pub(crate) fn reserved<T>(count: usize) -> Result<Vec<T>, MemoryError> {
 ///
 /// # Errors
 /// [`MemoryError::Machine`] when the system has too little.
+#[cfg(feature = "files")]
 pub(crate) fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, MemoryError> {
     let mut out = reserved(count)?;
     out.resize(count, value);
@@ -104,17 +81,5 @@ mod tests {
         assert!(filled(usize::MAX / 8, 0_u64).is_err());
         assert_eq!(filled(3, 7).unwrap(), [7; 3]);
         check(1 << 20, Purpose::Match).unwrap();
-    }
-
-    #[test]
-    fn claims_add_up() {
-        let Some(free) = available() else { return };
-        let share = free / 3 * 2;
-        let first = Claim::new(share).unwrap();
-        assert!(Claim::new(share).is_err(), "both together are too much");
-        assert!(Claim::new(u64::MAX).is_err());
-        drop(first);
-        assert_eq!(CLAIMED.get().load(Ordering::Relaxed), 0);
-        drop(Claim::new(share).unwrap());
     }
 }

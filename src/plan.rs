@@ -361,7 +361,7 @@ impl Plan {
     /// Whether the texture zones limit the labels of their pixels.
     #[must_use]
     pub fn limits_labels(&self) -> bool {
-        self.method.front.zone_sigmas > 0.0
+        self.method.front.limits_labels()
     }
 
     /// The largest sum of squared label changes at the finest level that counts as settled; `None` if message

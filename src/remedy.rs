@@ -9,6 +9,7 @@ use crate::error::{
 };
 use crate::front::check::Warning;
 use crate::maps::FRACTION;
+#[cfg(feature = "cameras")]
 use crate::rectification::Doubt;
 
 /// A front end's names for its options; `None` for options that it does not have.
@@ -139,6 +140,7 @@ pub fn of_rectified(warning: &Warning, calibrated: bool, words: &Vocabulary) -> 
 }
 
 /// A doubt about a rectification, or about the calibration of a rectified pair, with its remedy.
+#[cfg(feature = "cameras")]
 #[must_use]
 pub fn doubt(doubt: &Doubt, Vocabulary { unit, crop, .. }: &Vocabulary) -> String {
     let remedy = match doubt {

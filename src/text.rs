@@ -43,6 +43,7 @@ pub fn quoted(text: &str) -> String {
 }
 
 /// The edit distance between two words, ignoring case: letters to insert, delete or replace.
+#[cfg(feature = "cameras")]
 pub(crate) fn letters_apart(one: &str, other: &str) -> usize {
     let (one, other) = (one.to_lowercase(), other.to_lowercase());
     let mut row: Vec<usize> = (0..=other.chars().count()).collect();
@@ -57,7 +58,7 @@ pub(crate) fn letters_apart(one: &str, other: &str) -> usize {
     row.last().copied().unwrap_or_default()
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "cameras"))]
 mod tests {
     use super::*;
 

@@ -26,7 +26,8 @@ static KERNELS: LazyLock<Vec<Kernel>> = LazyLock::new(|| variants::kernels(&PLAN
 
 /// The names of all arrays of these plans.
 static NAMES: LazyLock<HashSet<&str>> = LazyLock::new(|| {
-    let names = |plan: &Plan| Data::all(plan).into_iter().map(|data| data.array(plan).name).collect::<Vec<_>>();
+    let names =
+        |plan: &Plan| Data::all(plan).into_iter().map(|data| data.array(plan).name).collect::<Vec<_>>();
     PLANS.iter().step_by(50).flat_map(names).collect()
 });
 
@@ -363,7 +364,8 @@ fn check_order(program: &Program) -> Result<(), String> {
     let mut written = HashSet::new();
     for (step, plan) in program.with_plans() {
         if let Step::Enter(_) | Step::Condition = step {
-            written.extend(Data::all(plan).into_iter().filter(|data| data.array(plan).start != Start::Anything));
+            written
+                .extend(Data::all(plan).into_iter().filter(|data| data.array(plan).start != Start::Anything));
             // Windows hold all labels until they are found.
             written.extend((0..plan.levels.len()).map(Data::Windows));
         }

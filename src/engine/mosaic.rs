@@ -5,7 +5,6 @@ use crate::backend::{Backend, Map, NO_LABEL};
 use crate::error::{Error, Purpose, Result};
 use crate::image::{Pair, Plane, Rect};
 use crate::memory;
-use crate::options::Illumination;
 use crate::plan::Plan;
 use crate::program::{Frame, View};
 use crate::stage::MapSet;
@@ -86,7 +85,7 @@ impl Mosaic {
                 }
             }
         }
-        if self.plan.method.front.illumination != Illumination::None {
+        if self.plan.method.front.corrects_illumination() {
             // Later stages use the colours as they were matched.
             let wanted = 1 + usize::from(self.plan.method.refinement.right_map);
             let views = self.pair.views_mut().into_iter().zip([pair.left(), pair.right()]);

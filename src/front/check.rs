@@ -8,6 +8,7 @@ use crate::error::{RangeError, Result};
 use crate::image::{Image, Orientation, Pair};
 use crate::maps::{FRACTION, Maps, flag};
 use crate::options::DisparityRange;
+#[cfg(feature = "cameras")]
 use crate::rectification::{self, Rectification};
 
 /// Fewer matches than this give no statistics.
@@ -82,7 +83,8 @@ const MIN_LABELS: usize = 3;
 /// Matches that are far from all others, in the image or in disparity, do not count.
 ///
 /// # Errors
-/// [`RangeError::NotRectified`] when the pair has too few matches, but enough after rectification by its own;
+/// [`RangeError::NotRectified`] when the pair has too few matches, but enough after rectification by its own (with the
+/// feature `cameras`);
 /// [`RangeError::NotFound`] when it has too few in any case, with the warning if one explains that;
 /// [`Error::Memory`](crate::Error::Memory) when the machine has too little memory for the search.
 pub fn range(pair: &Pair) -> Result<DisparityRange> {
@@ -106,10 +108,12 @@ fn range_from(pair: &Pair, least: Option<f64>) -> Result<DisparityRange> {
         return range;
     }
     let cause = of_pixels(pair, None).into_iter().find(Warning::is_beyond_range);
+    #[cfg(feature = "cameras")]
     let rectified = || {
         let by = Rectification::of_pair(pair, &rectification::Options::default()).ok()?;
         range_by_matches(&by.apply(pair).ok()?, None)
     };
+    #[cfg(feature = "cameras")]
     if matches!(cause, None | Some(Warning::NotRectified { .. })) && matches!(rectified(), Some(Ok(_))) {
         return Err(RangeError::NotRectified.into());
     }

@@ -6,7 +6,6 @@
 use bytemuck::{Pod, cast_slice, cast_slice_mut};
 use std::borrow::Cow;
 
-use super::illumination::gaussian;
 use crate::image::cubic::{BITS, WEIGHTS};
 use crate::image::{Image, Pixel, Plane, grey};
 use crate::maps::FRACTION;
@@ -16,6 +15,17 @@ use crate::threads::prelude::*;
 pub(super) trait Pixels: Pod + Send + Sync {}
 
 impl<T: Pod + Send + Sync> Pixels for T {}
+
+/// Weights of a Gaussian of `sigma` pixels at -`radius` ..= `radius`; they sum to 1.
+pub(super) fn gaussian(sigma: f64, radius: usize) -> Vec<f64> {
+    let weight = |i: usize| {
+        let x = i.abs_diff(radius) as f64 / sigma;
+        libm::exp(-x * x / 2.0)
+    };
+    let weights: Vec<f64> = (0..=2 * radius).map(weight).collect();
+    let sum: f64 = weights.iter().sum();
+    weights.iter().map(|w| w / sum).collect()
+}
 
 /// Weights of adjacent pixels; they sum to 2 to [`BITS`].
 struct Taps {

@@ -4,6 +4,7 @@
 //! So the local geometric mean, which is the low-pass of the logarithm, stands for illumination, and dividing
 //! by it leaves reflectance. The paper gives only the size of the filter, 21 x 21; the rest is decided here.
 
+use super::filter::gaussian;
 use crate::image::{Image, Pixel, Plane, grey};
 use crate::threads::prelude::*;
 
@@ -75,17 +76,6 @@ fn correct_on<'a, S: pulp::Simd>(_: S, masked: &'a [bool], gains: &'a [f64], pix
             *pixel = [r, g, b, grey(r, g, b)];
         }
     }
-}
-
-/// Weights of a Gaussian of `sigma` pixels at -`radius` ..= `radius`; they sum to 1.
-pub(super) fn gaussian(sigma: f64, radius: usize) -> Vec<f64> {
-    let weight = |i: usize| {
-        let x = i.abs_diff(radius) as f64 / sigma;
-        libm::exp(-x * x / 2.0)
-    };
-    let weights: Vec<f64> = (0..=2 * radius).map(weight).collect();
-    let sum: f64 = weights.iter().sum();
-    weights.iter().map(|w| w / sum).collect()
 }
 
 /// Index `i` reflected into 0 .. `n`: -1 becomes 0, n becomes n - 1.

@@ -3,45 +3,33 @@
 
 pub mod check;
 pub mod conditioning;
+#[cfg(feature = "cameras")]
 pub mod drift;
+#[cfg(feature = "cameras")]
 mod exchanged;
 mod filter;
+#[cfg(feature = "paper")]
 pub mod illumination;
+#[cfg(feature = "paper")]
 pub mod label_range;
 pub mod matches;
+#[cfg(feature = "paper")]
+mod paper;
 mod parts;
+mod prepared;
+#[cfg(feature = "cameras")]
 mod unrectified;
+#[cfg(feature = "paper")]
 pub mod zones;
 
+pub use prepared::Prepared;
+
 use crate::error::{Error, Purpose, Result};
-use crate::image::{Pair, Plane};
+use crate::image::Pair;
 use crate::memory;
-use crate::options::Illumination;
 use crate::plan::Plan;
 use crate::watch::Watch;
 use conditioning::Conditioning;
-use illumination::homomorphic;
-use matches::SparseMatch;
-use zones::Zones;
-
-/// Everything that a backend needs for a match.
-#[derive(Clone, Debug)]
-pub struct Prepared {
-    /// The pair to match, its illumination corrected where the method asks for it.
-    pub pair: Pair,
-    /// First and last label index of each pixel, by level; empty where every label is allowed.
-    pub label_ranges: Vec<Plane<[u16; 2]>>,
-    /// The source of the label ranges: texture zones and sparse matches.
-    pub zones: Option<(Zones, Vec<SparseMatch>)>,
-}
-
-impl Prepared {
-    /// A pair that is matched as it is, with all labels.
-    #[must_use]
-    pub fn new(pair: &Pair) -> Self {
-        Self { pair: pair.clone(), label_ranges: Vec::new(), zones: None }
-    }
-}
 
 /// The pair that is matched by `plan` in the place of `pair`, and what was corrected in that. Where the pair is matched at half its
 /// size, its faults are measured there.
@@ -79,40 +67,19 @@ pub fn doubled(pair: &Pair, conditioning: &Conditioning) -> Result<Pair> {
 /// # Errors
 /// [`Error::Mismatch`] when the plan is for another size, [`Error::Memory`] when the machine cannot hold it, and
 /// [`Error::Interrupted`] when the observer breaks.
+#[cfg_attr(not(feature = "paper"), expect(unused_variables, reason = "nothing takes long"))]
 pub fn prepare(pair: Pair, plan: &Plan, watch: &mut Watch) -> Result<Prepared> {
     if plan.size() != pair.size() {
         let (plan, pair) = (plan.size(), pair.size());
         return Err(Error::Mismatch(format!("a plan for {plan:?} and a pair of {pair:?}")));
     }
     memory::check(plan.front_bytes(), Purpose::Match)?;
-    let method = &plan.method;
-    let illumination = method.front.illumination;
-    let corrected = match illumination {
-        Illumination::None => None,
-        Illumination::Homomorphic | Illumination::HomomorphicFirst => {
-            let both = || {
-                let corrected = Pair::new(homomorphic(pair.left()), homomorphic(pair.right()))?;
-                Ok(corrected.with_full(pair.full().cloned()))
-            };
-            Some(watch.host("illumination", both)?)
-        }
-    };
-    let matched = corrected.as_ref().unwrap_or(&pair);
-    let mut prepared = Prepared::new(matched);
-    if plan.limits_labels() {
-        let pair = if illumination == Illumination::HomomorphicFirst { matched } else { &pair };
-        let options = zones::Options {
-            clusters: method.front.clusters as usize,
-            extent: method.front.zone_extent,
-            ..zones::Options::default()
-        };
-        let zones = watch.host("zones", || Ok(zones::segment(pair.left(), &options)))?;
-        matches::check_memory(pair)?;
-        let split = Some((&zones.map, zones.count));
-        let matches = watch.host("matches", || Ok(matches::find(pair, split, Some(plan.range))))?;
-        prepared.label_ranges =
-            watch.host("label_range", || Ok(label_range::levels(plan, &zones, &matches)))?;
-        prepared.zones = Some((zones, matches));
+    #[cfg(feature = "paper")]
+    {
+        paper::prepare(&pair, plan, watch)
     }
-    Ok(prepared)
+    #[cfg(not(feature = "paper"))]
+    {
+        Ok(Prepared::new(&pair))
+    }
 }

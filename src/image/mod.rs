@@ -1,28 +1,49 @@
 //! Planes of pixels, and the stereo pair.
 
+#[cfg(feature = "files")]
 mod both;
+#[cfg(feature = "cameras")]
 pub mod calib;
+#[cfg(feature = "cameras")]
 pub mod cloud;
 pub(crate) mod cubic;
+#[cfg(feature = "files")]
 mod decode;
 mod downsampled;
+#[cfg(feature = "files")]
 mod file;
+#[cfg(feature = "cameras")]
 mod fit;
+#[cfg_attr(not(feature = "files"), path = "georeference_without_files.rs")]
 mod georeference;
 mod halved;
+#[cfg(feature = "files")]
 mod jpeg;
 #[cfg(feature = "las")]
 mod las;
+#[cfg(feature = "files")]
 mod npy;
 mod orientation;
+#[cfg(feature = "cameras")]
 pub mod pcd;
+#[cfg(feature = "files")]
 pub mod pfm;
+#[cfg(feature = "files")]
 pub mod picture;
+#[cfg(feature = "cameras")]
 pub mod ply;
 pub mod raster;
+#[cfg(feature = "files")]
 pub mod read;
+#[cfg(feature = "files")]
 mod save;
+#[cfg(feature = "cameras")]
+mod save_cloud;
+#[cfg(feature = "files")]
 mod tiff;
+#[cfg(feature = "files")]
+mod upright;
+#[cfg(feature = "files")]
 pub mod write;
 
 pub use georeference::Georeference;

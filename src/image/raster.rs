@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 use std::fmt::Display;
-use std::path::Path;
 
 use super::georeference::Georeference;
 use super::orientation::Orientation;
@@ -186,11 +185,6 @@ impl<'a> Raster<'a> {
         self.doubt.as_deref()
     }
 
-    /// Prepends the name of its file to the doubt.
-    pub(super) fn named(self, file: &Path) -> Self {
-        Self { doubt: self.doubt.map(|doubt| format!("{}: {doubt}", file.display())), ..self }
-    }
-
     /// (width, height) in pixels.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
@@ -242,39 +236,6 @@ impl<'a> Raster<'a> {
         Ok(Raster { no_data, doubt, ..Raster::new(part.x.len(), part.y.len(), n, samples)? })
     }
 
-    /// The image rotated upright by its orientation tag; if that changes it, without its georeference.
-    pub(super) fn upright(self) -> Result<Self, MemoryError> {
-        fn turned<S: Copy>(
-            values: &[S],
-            each: usize,
-            by: Orientation,
-            (width, height): (usize, usize),
-        ) -> Result<Vec<S>, MemoryError> {
-            let row = if by.is_sideways() { height } else { width };
-            let mut out = memory::reserved(values.len())?;
-            for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-                let (u, v) = by.stored((x, y), (width, height));
-                out.extend_from_slice(&values[(v * row + u) * each..][..each]);
-            }
-            Ok(out)
-        }
-        let (by, n) = (self.orientation, self.channels);
-        if by.is_upright() {
-            return Ok(self);
-        }
-        let size = if by.is_sideways() { (self.height, self.width) } else { self.size() };
-        let samples = of_any!(&self.samples, v => Sample::samples(turned(v, n, by, size)?.into()));
-        let no_data = self.no_data.as_ref().map(|marked| turned(marked, 1, by, size)).transpose()?;
-        Ok(Self { no_data, doubt: self.doubt, ..Self::of(size, n, samples) })
-    }
-
-    /// Applies `f` to the grey or colour samples of each pixel.
-    pub(super) fn plane<S, T>(&self, samples: &[S], f: impl Fn(&[S]) -> T) -> Plane<T> {
-        let colours = self.colours();
-        let values = samples.chunks_exact(self.channels).map(|pixel| f(&pixel[..colours])).collect();
-        Plane::new(self.width, self.height, values)
-    }
-
     /// `true` where alpha is 0 or a value is not finite.
     pub(super) fn masked(&self) -> Plane<bool> {
         let n = self.channels;
@@ -291,7 +252,7 @@ impl<'a> Raster<'a> {
     }
 
     /// Number of grey or colour samples.
-    fn colours(&self) -> usize {
+    pub(super) fn colours(&self) -> usize {
         if self.channels < 3 { 1 } else { 3 }
     }
 

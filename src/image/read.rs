@@ -207,8 +207,8 @@ impl Reader {
     /// Reads a disparity map in pixels; invalid pixels become +infinity. PFM, float TIFF and NumPy floats
     /// hold disparities directly (not finite = invalid), 16-bit PNG holds them times 256 (0 = invalid).
     ///
+    /// # Errors
     /// [`Error::Read`] when the file is missing, damaged, or holds no disparities in one of these forms.
-    /// [`Error::Read`] when the file is missing, damaged, or holds no disparities in one of these ways.
     pub fn disparity(self, path: &Path) -> Result<Plane<f32>> {
         self.map(path, None)
     }
@@ -216,8 +216,8 @@ impl Reader {
     /// Reads disparities times `scale`, stored as whole numbers in a PNG, TIFF or NumPy array with 8 or 16
     /// bits, as in the ground truth of the older Middlebury sets; 0 means unknown and becomes +infinity.
     ///
+    /// # Errors
     /// [`Error::Read`] when the file is missing, damaged, or does not hold such numbers.
-    /// [`Error::Read`] when the file is missing, damaged, or holds no such numbers.
     pub fn scaled_disparity(self, path: &Path, scale: f32) -> Result<Plane<f32>> {
         self.map(path, Some(scale))
     }
@@ -259,6 +259,20 @@ impl Reader {
             }
         }
         Ok(map)
+    }
+}
+
+impl Raster<'_> {
+    /// Prepends the name of its file to the doubt.
+    pub(super) fn named(self, file: &Path) -> Self {
+        Self { doubt: self.doubt.map(|doubt| format!("{}: {doubt}", file.display())), ..self }
+    }
+
+    /// Applies `f` to the grey or colour samples of each pixel.
+    fn plane<S, T>(&self, samples: &[S], f: impl Fn(&[S]) -> T) -> Plane<T> {
+        let colours = self.colours();
+        let values = samples.chunks_exact(self.channels).map(|pixel| f(&pixel[..colours])).collect();
+        Plane::new(self.width, self.height, values)
     }
 }
 

@@ -5,19 +5,17 @@ use std::path::Path;
 
 use image::ExtendedColorType;
 
-use super::cloud::Cloud;
 use super::picture::{Picture, png, png_or_tiff_size};
 use super::save::check;
-use super::{Georeference, Plane, pcd, pfm, ply, tiff};
+use super::{Georeference, Plane, pfm, tiff};
 use crate::error::{Error, Reason, Result};
 
 pub use super::save::{Growing, no_folder, publish, remove, save};
+#[cfg(feature = "cameras")]
+pub use super::save_cloud::cloud;
 
 /// Disparities in 16-bit PNG files are in 1/256 of a pixel, as in the KITTI benchmark.
 const PNG_SCALE: f32 = 256.0;
-
-/// The extensions of point clouds.
-const CLOUDS: &str = if cfg!(feature = "las") { ".ply, .pcd, .las or .laz" } else { ".ply or .pcd" };
 
 /// The format of a disparity map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,28 +137,6 @@ pub fn check_path(path: &Path) -> Result<()> {
     check(path)
 }
 
-/// Writes a point cloud in the format of the extension: `.ply` ([`ply::encode`]) or `.pcd` ([`pcd::encode`]);
-/// with the feature `las` also LAS 1.2 as `.las` and `.laz`, whose intensity is 257 times the confidence. An
-/// existing path that is not a regular file gets PLY if its name has no such extension.
-///
-/// # Errors
-/// [`Error::Write`] for another extension, points that the format cannot hold, or a file that cannot be written.
-pub fn cloud(path: &Path, cloud: &Cloud) -> Result<()> {
-    let bytes = match extension(path).as_deref() {
-        Some("ply") => ply::encode(cloud),
-        Some("pcd") => pcd::encode(cloud),
-        #[cfg(feature = "las")]
-        Some(word @ ("las" | "laz")) => {
-            super::las::encode(cloud, word == "laz").map_err(|reason| Error::write(path, reason))?
-        }
-        _ if is_special(path) => ply::encode(cloud),
-        _ => {
-            return Err(Error::write(path, Reason::of_request(format!("point clouds end in {CLOUDS}"))));
-        }
-    };
-    save(path, &bytes)
-}
-
 /// Writes a picture as PNG.
 ///
 /// # Errors
@@ -198,12 +174,12 @@ fn format(path: &Path) -> Result<Format> {
 }
 
 /// The extension in lower case.
-fn extension(path: &Path) -> Option<String> {
+pub(super) fn extension(path: &Path) -> Option<String> {
     Some(path.extension()?.to_str()?.to_ascii_lowercase())
 }
 
 /// Whether `path` exists and is neither a file nor a folder.
-fn is_special(path: &Path) -> bool {
+pub(super) fn is_special(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
@@ -263,22 +239,6 @@ mod tests {
             assert!([".pfm", ".tif", "b.png"].iter().all(|word| error.contains(word)), "{error}");
         }
         assert_eq!(names(folder.path()).len(), 7, "nothing temporary stays");
-    }
-
-    #[test]
-    fn the_extension_of_a_cloud_decides_its_format() {
-        let folder = tempfile::tempdir().unwrap();
-        for refused in ["a.xyz", "a"] {
-            let error = cloud(&folder.path().join(refused), &Cloud::default()).unwrap_err().to_string();
-            assert!(error.contains(refused) && error.contains(CLOUDS), "{error}");
-        }
-        // An empty cloud is valid.
-        for (name, end) in [("a.PLY", &b"end_header\n"[..]), ("a.pcd", b"DATA binary\n")] {
-            let path = folder.path().join(name);
-            cloud(&path, &Cloud::default()).unwrap();
-            assert!(fs::read(path).unwrap().ends_with(end), "{name}");
-        }
-        assert_eq!(names(folder.path()), ["a.PLY", "a.pcd"]);
     }
 
     #[test]

@@ -1,7 +1,10 @@
 //! Options of the front end.
 
-use super::row::{Takes, one_of, options, real, whole, words};
+use super::row::{Takes, options};
+#[cfg(feature = "paper")]
+use super::row::{one_of, real, whole, words};
 
+#[cfg(feature = "paper")]
 words! {
     /// Correction of the illumination.
     Illumination {
@@ -17,6 +20,7 @@ words! {
     }
 }
 
+#[cfg(feature = "paper")]
 words! {
     /// What a texture zone is.
     ZoneExtent {
@@ -31,6 +35,7 @@ options! {
     /// What is done before any cost is computed: illumination, texture zones, label ranges.
     "front" FrontOptions {
         /// Correction of the illumination of both images.
+        #[cfg(feature = "paper")]
         illumination: Illumination = Illumination::None, takes one_of(Illumination::WORDS),
             source "sections 2.4 and 3.1: homomorphic", for reproduction;
         /// Moves the right view up or down by the median vertical offset of sparse matches, from a sixteenth
@@ -43,11 +48,41 @@ options! {
         denoise: bool = true, takes Takes::Switch, source "not in the paper";
         /// Number of clusters into which K-means sorts the Gabor responses of the reference image, for
         /// texture zones. Used if zone-sigmas is above 0.
+        #[cfg(feature = "paper")]
         clusters: u32 = 15, takes whole(1..=64), unit "clusters", source "section 3.1: 15", for reproduction;
         /// What a texture zone is.
+        #[cfg(feature = "paper")]
         zone_extent: ZoneExtent = ZoneExtent::Region, takes one_of(ZoneExtent::WORDS), source "section 2.4: region", for reproduction;
         /// Limits the labels of a pixel to this many standard deviations around the mean disparity of its
         /// zone's sparse matches; 0 keeps all labels, and so does a zone of fewer than 10 matches.
+        #[cfg(feature = "paper")]
         zone_sigmas: f64 = 0.0, takes real(0.0..=100.0), unit "standard deviations", source "section 2.4: 1", for reproduction;
+    }
+}
+
+#[cfg(feature = "paper")]
+impl FrontOptions {
+    /// Whether the illumination of the images is corrected.
+    pub(crate) fn corrects_illumination(&self) -> bool {
+        self.illumination != Illumination::None
+    }
+
+    /// Whether texture zones limit the labels of their pixels.
+    pub(crate) fn limits_labels(&self) -> bool {
+        self.zone_sigmas > 0.0
+    }
+}
+
+#[cfg(not(feature = "paper"))]
+#[allow(clippy::unused_self, reason = "with the feature they look at its options")]
+impl FrontOptions {
+    /// No illumination is corrected.
+    pub(crate) fn corrects_illumination(&self) -> bool {
+        false
+    }
+
+    /// No labels are limited.
+    pub(crate) fn limits_labels(&self) -> bool {
+        false
     }
 }

@@ -7,7 +7,7 @@ use super::front::FrontOptions;
 use super::graph::GraphOptions;
 use super::messages::MessageOptions;
 use super::refinement::RefinementOptions;
-use super::row::{Group, Key};
+use super::row::Group;
 use super::schedule::ScheduleOptions;
 use super::tiles::TileOptions;
 use crate::error::{Error, OptionError, Result};
@@ -44,16 +44,12 @@ pub const GROUPS: &[Group] = &[
     TileOptions::GROUP,
 ];
 
-/// Every key with its group, in order.
-pub(super) fn keys() -> impl Iterator<Item = (&'static Group, &'static Key)> {
-    GROUPS.iter().flat_map(|group| group.keys.iter().map(move |key| (group, key)))
-}
-
 impl Method {
     /// All values, as a table for each group with a value for each key.
     ///
     /// # Panics
     /// Never: every field is a plain value.
+    #[cfg(feature = "files")]
     #[must_use]
     pub fn table(&self) -> toml::Table {
         toml::Table::try_from(self).expect("plain values serialise")
@@ -70,17 +66,20 @@ impl Method {
 
     /// Finds the first key that is out of its range.
     pub(super) fn check(&self) -> Result<(), (String, OptionError)> {
-        let table = self.table();
-        for (group, key) in keys() {
-            let name = key.name();
-            key.checked(table[group.name][&name].clone()).map_err(|cause| (name, cause))?;
-        }
+        self.front.check_each()?;
+        self.cost.check_each()?;
+        self.graph.check_each()?;
+        self.messages.check_each()?;
+        self.schedule.check_each()?;
+        self.refinement.check_each()?;
+        self.tiles.check_each()?;
         self.cost.check()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::row::Key;
     use super::*;
 
     #[test]
@@ -97,7 +96,7 @@ mod tests {
     #[test]
     fn a_name_means_one_thing() {
         let mut names: Vec<_> = GROUPS.iter().map(|group| group.name.to_owned()).collect();
-        names.extend(keys().map(|(_, key)| key.name()));
+        names.extend(GROUPS.iter().flat_map(|group| group.keys).map(Key::name));
         names.sort();
         assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
     }

@@ -18,6 +18,7 @@ mod messages;
 mod method;
 mod presets;
 mod range;
+#[cfg(feature = "files")]
 mod read;
 mod refinement;
 mod row;
@@ -26,7 +27,9 @@ mod tiles;
 
 pub use cost::{CostFacts, CostOptions, MatchingCost, Pyramid};
 pub use execution::{DeviceChoice, Execution};
-pub use front::{FrontOptions, Illumination, ZoneExtent};
+pub use front::FrontOptions;
+#[cfg(feature = "paper")]
+pub use front::{Illumination, ZoneExtent};
 pub use graph::GraphOptions;
 pub use messages::{Agreement, MessageOptions, Potential};
 pub use method::{GROUPS, Method};

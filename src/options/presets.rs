@@ -1,9 +1,9 @@
 //! Presets: the rows of the options define `default`; the others list their differences.
 
-use super::{
-    Agreement, CostOptions, Fill, FrontOptions, GraphOptions, Illumination, LeftRightCheck, MatchSize,
-    MatchingCost, MessageOptions, Method, Order, Potential, Pyramid, RefinementOptions, ScheduleOptions,
-};
+#[cfg(feature = "paper")]
+mod paper;
+
+use super::{FrontOptions, MatchSize, MessageOptions, Method, RefinementOptions, ScheduleOptions};
 use crate::error::{Error, Result};
 use crate::text::one_line;
 
@@ -38,11 +38,13 @@ pub const PRESETS: &[Preset] = &[
         about: "matches the pair at half its size, in a quarter of the default's time: for video and robots",
         make: Method::fast,
     },
+    #[cfg(feature = "paper")]
     Preset {
         name: "paper",
         about: "the paper's whole method, with its choices wherever it states them",
         make: Method::paper,
     },
+    #[cfg(feature = "paper")]
     Preset {
         name: "fgs",
         about: "the paper's predecessor: one resolution, and a left-right check by a second matching",
@@ -111,65 +113,6 @@ impl Method {
                 ..RefinementOptions::default()
             },
             ..Self::default()
-        }
-    }
-
-    /// The paper's whole method, with its choices wherever it states them. Where it leaves one open, the
-    /// preset takes what brings the printed tables closest, the same for all pairs; see `docs/paper.md`.
-    #[must_use]
-    pub fn paper() -> Self {
-        Self {
-            front: FrontOptions {
-                illumination: Illumination::Homomorphic,
-                level_rows: false,
-                equal_sharpness: false,
-                denoise: false,
-                zone_sigmas: 1.0,
-                ..FrontOptions::default()
-            },
-            cost: CostOptions {
-                matching: MatchingCost::Sad,
-                outside_cost: 10.0,
-                pyramid: Pyramid::Minimum,
-                ..CostOptions::default()
-            },
-            messages: MessageOptions {
-                temperature: 0.1,
-                evidence_cap: 8.0,
-                evidence_gain: 1.0,
-                potential: Potential::Hard,
-                agreement: Agreement::Interpolating,
-                ..MessageOptions::default()
-            },
-            schedule: ScheduleOptions {
-                order: Order::Together,
-                iterations: 30,
-                tolerance: 0.1,
-                ..ScheduleOptions::default()
-            },
-            refinement: RefinementOptions {
-                left_right_check: LeftRightCheck::Off,
-                speckle_size: 0,
-                sub_pixel: false,
-                fill: Fill::Row,
-                median_window: 21,
-                median_sigma_space: 10.0,
-                plane: false,
-                ..RefinementOptions::default()
-            },
-            ..Self::default()
-        }
-    }
-
-    fn fgs() -> Self {
-        let paper = Self::paper();
-        Self {
-            graph: GraphOptions { levels: 1, ..paper.graph },
-            refinement: RefinementOptions {
-                left_right_check: LeftRightCheck::SecondMatch,
-                ..paper.refinement
-            },
-            ..paper
         }
     }
 }

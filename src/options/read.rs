@@ -7,8 +7,7 @@ use serde::Deserialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
-use super::method::keys;
-use super::row::{Group, Key};
+use super::row::{Group, Key, Takes, Value};
 use super::{GROUPS, Method};
 use crate::error::{Error, OptionError, ReadError, Result};
 use crate::text;
@@ -87,7 +86,7 @@ impl Method {
     fn merged(&self, changes: impl IntoIterator<Item = Change>) -> Result<Self, Misfit> {
         let mut table = self.table();
         for (name, value) in changes {
-            let stored = find(&name).and_then(|(group, key)| Ok((group, key, key.checked(value)?)));
+            let stored = find(&name).and_then(|(group, key)| Ok((group, key, checked(key, value)?)));
             let (group, key, value) = stored.map_err(|cause| (name, cause))?;
             table[group.name][key.name()] = value;
         }
@@ -96,6 +95,30 @@ impl Method {
         method.check()?;
         Ok(method)
     }
+}
+
+/// `value` as `key` stores it, or why it is invalid.
+fn checked(key: &Key, value: toml::Value) -> Result<toml::Value, OptionError> {
+    use toml::Value::{Boolean, Float, Integer, String};
+    let value = match (key.takes, value) {
+        // Whole numbers are valid for real keys.
+        (Takes::Real { .. }, Integer(v)) => Float(v as f64),
+        (_, value) => value,
+    };
+    let plain = match &value {
+        Boolean(_) => Value::Switch,
+        String(word) => Value::Word(word),
+        Integer(v) => Value::Whole(*v),
+        Float(v) => Value::Real(*v),
+        _ => Value::Other,
+    };
+    key.check(plain, || value.to_string())?;
+    Ok(value)
+}
+
+/// Every key with its group, in order.
+fn keys() -> impl Iterator<Item = (&'static Group, &'static Key)> {
+    GROUPS.iter().flat_map(|group| group.keys.iter().map(move |key| (group, key)))
 }
 
 /// The entries of a file in order: keys, with the group in front if there is one, places and values.

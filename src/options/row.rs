@@ -43,31 +43,27 @@ impl Key {
         self.field.replace('_', "-")
     }
 
-    /// `value` as this key stores it, or why it is invalid.
-    pub(super) fn checked(&self, value: toml::Value) -> Result<toml::Value, OptionError> {
-        use toml::Value::{Boolean, Float, Integer, String};
+    /// Why `value` is invalid, if it is; `shown` is how it is quoted.
+    pub(super) fn check(&self, value: Value, shown: impl FnOnce() -> String) -> Result<(), OptionError> {
         let outside = |value: f64, low: f64, high: f64| Err(OptionError::OutOfRange { value, low, high });
-        let value = match (self.takes, value) {
-            // Whole numbers are valid for real keys.
-            (Takes::Real { .. }, Integer(v)) => Float(v as f64),
-            (_, value) => value,
-        };
-        match (self.takes, &value) {
-            (Takes::Whole { low, high, .. }, Integer(v)) if *v < low.into() || *v > high.into() => {
-                outside(*v as f64, low.into(), high.into())
+        match (self.takes, value) {
+            (Takes::Whole { low, high, .. }, Value::Whole(v)) if v < low.into() || v > high.into() => {
+                outside(v as f64, low.into(), high.into())
             }
-            (Takes::Whole { odd: true, .. }, Integer(v)) if v % 2 == 0 => {
-                Err(OptionError::NotOdd { value: *v as u32 })
+            (Takes::Whole { odd: true, .. }, Value::Whole(v)) if v % 2 == 0 => {
+                Err(OptionError::NotOdd { value: v as u32 })
             }
             // NaN is outside every range.
-            (Takes::Real { low, high }, Float(v)) if !(low..=high).contains(v) => outside(*v, low, high),
-            (Takes::Switch, Boolean(_))
-            | (Takes::Whole { .. }, Integer(_))
-            | (Takes::Real { .. }, Float(_)) => Ok(value),
-            (Takes::Words(words), String(word)) if words.iter().any(|w| w.word == word) => Ok(value),
+            (Takes::Real { low, high }, Value::Real(v)) if !(low..=high).contains(&v) => {
+                outside(v, low, high)
+            }
+            (Takes::Switch, Value::Switch)
+            | (Takes::Whole { .. }, Value::Whole(_))
+            | (Takes::Real { .. }, Value::Real(_)) => Ok(()),
+            (Takes::Words(words), Value::Word(word)) if words.iter().any(|w| w.word == word) => Ok(()),
             _ => Err(OptionError::WrongKind {
                 expected: self.to_string(),
-                found: crate::text::one_line(&value.to_string()),
+                found: crate::text::one_line(&shown()),
             }),
         }
     }
@@ -81,6 +77,46 @@ impl fmt::Display for Key {
             (unit, takes @ Takes::Whole { odd: true, .. }) => write!(f, "{unit}, odd, {takes}"),
             (unit, takes) => write!(f, "{unit}, {takes}"),
         }
+    }
+}
+
+/// A value of a key, as far as its range concerns it.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Value<'a> {
+    /// True or false.
+    Switch,
+    /// A word.
+    Word(&'a str),
+    /// A whole number.
+    Whole(i64),
+    /// A real number.
+    Real(f64),
+    /// What no key takes.
+    #[cfg(feature = "files")]
+    Other,
+}
+
+/// A type of a field.
+pub(super) trait Stored: Copy {
+    /// What it holds.
+    fn value(self) -> Value<'static>;
+}
+
+impl Stored for bool {
+    fn value(self) -> Value<'static> {
+        Value::Switch
+    }
+}
+
+impl Stored for u32 {
+    fn value(self) -> Value<'static> {
+        Value::Whole(self.into())
+    }
+}
+
+impl Stored for f64 {
+    fn value(self) -> Value<'static> {
+        Value::Real(self)
     }
 }
 
@@ -155,13 +191,15 @@ pub struct Word {
 /// Declares a group of options: a struct with a field per row, its defaults, and its description `GROUP`.
 ///
 /// A row reads: `/// meaning`, then `key: type = default, takes range, unit "..." (if any), source "...";`. A
-/// final `for reproduction` marks an option that only serves to reproduce other readings of the paper.
+/// final `for reproduction` marks an option that only serves to reproduce other readings of the paper. A row with
+/// `#[cfg(...)]` after its meaning is there with a feature alone.
 macro_rules! options {
     (
         $(#[doc = $about:literal])+
         $name:literal $group:ident {
             $(
                 $(#[doc = $meaning:literal])+
+                $(#[cfg($($when:tt)+)])?
                 $field:ident: $type:ty = $default:expr, takes $takes:expr, $(unit $unit:literal,)? source $source:literal
                     $(, for $purpose:ident)?;
             )+
@@ -178,13 +216,14 @@ macro_rules! options {
                 #[doc = concat!("Range: `", stringify!($takes), "`" $(, " ", $unit)?, ".")]
                 #[doc = concat!("Default: `", stringify!($default), "`.")]
                 #[doc = concat!("Source: ", $source, ".")]
+                $(#[cfg($($when)+)])?
                 pub $field: $type,
             )+
         }
 
         impl Default for $group {
             fn default() -> Self {
-                Self { $( $field: $default, )+ }
+                Self { $( $(#[cfg($($when)+)])? $field: $default, )+ }
             }
         }
 
@@ -194,6 +233,7 @@ macro_rules! options {
                 name: $name,
                 meaning: concat!($($about),+).trim_ascii(),
                 keys: &[ $(
+                    $(#[cfg($($when)+)])?
                     $crate::options::Key {
                         field: stringify!($field),
                         takes: $takes,
@@ -204,6 +244,16 @@ macro_rules! options {
                     },
                 )+ ],
             };
+
+            /// Finds the first key that is out of its range.
+            pub(super) fn check_each(&self) -> Result<(), (String, $crate::error::OptionError)> {
+                use $crate::options::row::Stored;
+                let values = [ $( $(#[cfg($($when)+)])? self.$field.value(), )+ ];
+                for (key, value) in Self::GROUP.keys.iter().zip(values) {
+                    key.check(value, || format!("{value:?}")).map_err(|cause| (key.name(), cause))?;
+                }
+                Ok(())
+            }
         }
     };
 }
@@ -237,6 +287,12 @@ macro_rules! words {
             pub const WORDS: &[$crate::options::Word] = &[ $(
                 $crate::options::Word { word: $word, meaning: concat!($($meaning),+).trim_ascii() },
             )+ ];
+        }
+
+        impl $crate::options::row::Stored for $name {
+            fn value(self) -> $crate::options::row::Value<'static> {
+                $crate::options::row::Value::Word(match self { $( Self::$variant => $word, )+ })
+            }
         }
     };
 }

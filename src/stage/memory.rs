@@ -1,7 +1,6 @@
 //! The memory of a match: upper bounds.
 
 use super::{Data, Extent, Place, Start};
-use crate::options::Illumination;
 use crate::plan::votes::Votes;
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan, RING_PART, ROW_ALIGN};
 
@@ -118,7 +117,7 @@ impl Plan {
     /// (spectrum and responses).
     #[must_use]
     pub fn front_bytes(&self) -> u64 {
-        let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 66 };
+        let corrected = if self.method.front.corrects_illumination() { 66 } else { 0 };
         let zones = if self.limits_labels() { 200 } else { 0 };
         (corrected + zones) * self.levels[0].pixels() as u64
     }
@@ -151,7 +150,7 @@ impl Plan {
     /// derived, and 9 more if the left view is corrected.
     #[must_use]
     pub fn mosaic_bytes(&self) -> u64 {
-        let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 9 };
+        let corrected = if self.method.front.corrects_illumination() { 9 } else { 0 };
         // Disparities of the right view, its image and its maps.
         let right = if self.method.refinement.right_map { 4 + 2 * 9 + 12 } else { 0 };
         // The maps at full size, and a copy.

@@ -20,6 +20,7 @@ pub(crate) trait Slice<T> {
     fn par_chunks(&self, size: usize) -> slice::Chunks<'_, T>;
     fn par_chunks_mut(&mut self, size: usize) -> slice::ChunksMut<'_, T>;
     fn par_chunks_exact_mut(&mut self, size: usize) -> slice::ChunksExactMut<'_, T>;
+    #[cfg(feature = "paper")]
     fn par_chunk_by<F: FnMut(&T, &T) -> bool>(&self, joins: F) -> slice::ChunkBy<'_, T, F>;
 }
 
@@ -44,6 +45,7 @@ impl<T> Slice<T> for [T] {
         self.chunks_exact_mut(size)
     }
 
+    #[cfg(feature = "paper")]
     fn par_chunk_by<F: FnMut(&T, &T) -> bool>(&self, joins: F) -> slice::ChunkBy<'_, T, F> {
         self.chunk_by(joins)
     }

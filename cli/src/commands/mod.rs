@@ -12,5 +12,6 @@ pub(crate) mod man;
 pub(crate) mod r#match;
 pub(crate) mod presets;
 pub(crate) mod rectify;
+#[cfg_attr(not(feature = "live"), path = "ros_without_live.rs")]
 pub(crate) mod ros;
 pub(crate) mod sequence;

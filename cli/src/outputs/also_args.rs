@@ -227,6 +227,7 @@ impl AlsoArgs {
     }
 
     /// The topics of the selected outputs, each with its message type.
+    #[cfg(feature = "live")]
     pub(crate) fn topics(&self) -> impl Iterator<Item = messages::Topic> {
         self.wanted().filter_map(Also::topic)
     }

@@ -21,8 +21,6 @@ pub(crate) const DISPARITY: Topic = ("disparity", DisparityImage::NAME);
 pub(crate) const CAMERA: Topic = ("left/camera_info", CameraInfo::NAME);
 pub(crate) const DEPTH: Topic = ("depth/image_rect", Image::NAME);
 pub(crate) const MILLIMETRES: Topic = ("depth/image_rect_raw", Image::NAME);
-/// The camera of the depths, where ROS looks for it.
-pub(crate) const DEPTH_CAMERA: Topic = ("depth/camera_info", CameraInfo::NAME);
 /// Depths in the view of a third camera, and that camera.
 pub(crate) const REGISTERED: Topic = ("depth_registered/image", Image::NAME);
 pub(crate) const REGISTERED_MILLIMETRES: Topic = ("depth_registered/image_raw", Image::NAME);
@@ -34,15 +32,6 @@ pub(crate) const DEPTH_SIGMA: Topic = ("depth/sigma", Image::NAME);
 /// The topic of an 8-bit map called `name`.
 pub(crate) const fn of_bytes(name: &'static str) -> Topic {
     (name, Image::NAME)
-}
-
-/// The camera topic that accompanies depths on `topic`; `None` for other topics.
-pub(crate) fn camera_of(topic: Topic) -> Option<Topic> {
-    match topic {
-        DEPTH | MILLIMETRES => Some(DEPTH_CAMERA),
-        REGISTERED | REGISTERED_MILLIMETRES => Some(REGISTERED_CAMERA),
-        _ => None,
-    }
 }
 
 /// Receives the messages of a frame.

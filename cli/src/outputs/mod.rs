@@ -13,6 +13,7 @@ mod outcome;
 mod record;
 mod recording;
 mod staged;
+#[cfg_attr(not(feature = "live"), path = "viewer_without_live.rs")]
 mod viewer;
 
 pub(crate) use also::Also;
@@ -28,3 +29,5 @@ pub(crate) use record::{Files, MatchRecord, stage_and_level};
 pub(crate) use recording::RecordedMaps;
 pub(crate) use staged::StagedFolder;
 pub(crate) use viewer::ShownMaps;
+#[cfg(not(feature = "live"))]
+pub(crate) use viewer::WITHOUT_LIVE;

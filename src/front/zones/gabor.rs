@@ -18,7 +18,8 @@ use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlannerScalar};
 
 use super::lanes::{LANES, Lanes};
-use crate::front::illumination::{gaussian, smooth};
+use crate::front::filter::gaussian;
+use crate::front::illumination::smooth;
 use crate::image::Plane;
 use crate::threads::prelude::*;
 

@@ -6,7 +6,8 @@ use mrfgs::low_level::text::quoted;
 use mrfgs_node::names::{Names, Rule};
 use mrfgs_node::topics::{GID_BYTES, LONG_GID_BYTES, MOST_DOMAIN};
 
-use crate::args::{CameraArgs, CropArgs, ExecutionArgs, MethodArgs, RectificationArgs, Search, nanoseconds};
+use crate::args::recording::nanoseconds;
+use crate::args::{CameraArgs, CropArgs, ExecutionArgs, MethodArgs, RectificationArgs, Search};
 use crate::failure::{Failure, Result};
 use crate::outputs::AlsoArgs;
 

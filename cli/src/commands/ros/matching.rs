@@ -25,7 +25,7 @@ use crate::{console, remedy, stop};
 use super::args::Args;
 use super::arrivals::{Arrived, CameraTopics};
 use super::log::Log;
-use super::publications::Publications;
+use super::publications::{DEPTH_CAMERA, Publications};
 
 /// Matches pairs and publishes the results.
 pub(super) struct Matching<'a> {
@@ -135,7 +135,7 @@ impl<'a> Matching<'a> {
         if to.have_depth_camera()
             && let Some(camera) = messages.camera(header, map.size())
         {
-            to.put(messages::DEPTH_CAMERA, header, &camera)?;
+            to.put(DEPTH_CAMERA, header, &camera)?;
         }
         messages.put(header, self.args.also.contents(&outcome), to)?;
         Ok(pair.doubts().clone())

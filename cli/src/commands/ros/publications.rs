@@ -3,13 +3,16 @@
 use mrfgs::{Error, Result};
 use mrfgs_node::names::Names;
 use mrfgs_node::topics::{Participant, Publication};
-use mrfgs_ros::messages::{Encode, Header};
+use mrfgs_ros::messages::{CameraInfo, Encode, Header, Type};
 
 use crate::failure::{self, Failure};
 use crate::outputs::AlsoArgs;
 use crate::outputs::messages::{self, Sink, Topic};
 
 use super::arrivals::of_network;
+
+/// The camera of the depths, where ROS looks for it.
+pub(super) const DEPTH_CAMERA: Topic = ("depth/camera_info", CameraInfo::NAME);
 
 /// The disparity topic and the topics of the selected outputs.
 pub(super) struct Publications(Vec<(Topic, String, Publication)>);
@@ -19,7 +22,7 @@ impl Publications {
     pub(super) fn new(participant: &Participant, names: &Names, also: &AlsoArgs) -> failure::Result<Self> {
         let mut topics = vec![messages::DISPARITY];
         topics.extend(also.topics());
-        let mut cameras: Vec<_> = topics.iter().copied().filter_map(messages::camera_of).collect();
+        let mut cameras: Vec<_> = topics.iter().copied().filter_map(camera_of).collect();
         // Both units of depth share one camera topic.
         cameras.dedup();
         topics.extend(cameras);
@@ -49,7 +52,7 @@ impl Publications {
 
     /// Whether depths are published, which come with a camera.
     pub(super) fn have_depth_camera(&self) -> bool {
-        self.0.iter().any(|(topic, ..)| *topic == messages::DEPTH_CAMERA)
+        self.0.iter().any(|(topic, ..)| *topic == DEPTH_CAMERA)
     }
 }
 
@@ -63,5 +66,14 @@ impl Sink for Publications {
             publication.send(message.encode()).map_err(|reason| Error::write(name, reason))?;
         }
         Ok(())
+    }
+}
+
+/// The camera topic that accompanies depths on `topic`; `None` for other topics.
+fn camera_of(topic: Topic) -> Option<Topic> {
+    match topic {
+        messages::DEPTH | messages::MILLIMETRES => Some(DEPTH_CAMERA),
+        messages::REGISTERED | messages::REGISTERED_MILLIMETRES => Some(messages::REGISTERED_CAMERA),
+        _ => None,
     }
 }

@@ -1,0 +1,30 @@
+//! What a match needs of a pair.
+
+#[cfg(feature = "paper")]
+use super::{matches::SparseMatch, zones::Zones};
+use crate::image::{Pair, Plane};
+
+/// Everything that a backend needs for a match.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// The pair to match, its illumination corrected where the method asks for it.
+    pub pair: Pair,
+    /// First and last label index of each pixel, by level; empty where every label is allowed.
+    pub label_ranges: Vec<Plane<[u16; 2]>>,
+    /// The source of the label ranges: texture zones and sparse matches.
+    #[cfg(feature = "paper")]
+    pub zones: Option<(Zones, Vec<SparseMatch>)>,
+}
+
+impl Prepared {
+    /// A pair that is matched as it is, with all labels.
+    #[must_use]
+    pub fn new(pair: &Pair) -> Self {
+        Self {
+            pair: pair.clone(),
+            label_ranges: Vec::new(),
+            #[cfg(feature = "paper")]
+            zones: None,
+        }
+    }
+}
