@@ -42,7 +42,7 @@ left (x, y) with disparity d appears at right (x - d, y). Near objects move fart
 const EXAMPLES: &str = "\
 Examples:
   mrfgs demo                                  # try it on a built-in pair
-  mrfgs match left.jpg right.jpg disparity.png --rectify    # two hand-held photos
+  mrfgs match a.jpg b.jpg map.png --rectify   # two hand-held photos
   mrfgs match left.png right.png disparity.pfm --max-disparity 63
   mrfgs match im0.png im1.png disparity.png   # range: calib.txt beside im0.png
   mrfgs rectify left.png right.png rectified --calib stereo.yml

@@ -30,7 +30,7 @@ impl InFront {
         let remedy = if negated > seen { turned } else { check };
         let behind = all - seen;
         (2 * seen < all).then(|| {
-            format!("{behind} of {all} disparities are of nothing in front of the cameras; {remedy}")
+            format!("{behind} of {all} disparities lie behind the cameras; {remedy}")
         })
     }
 }
@@ -41,7 +41,7 @@ pub(crate) fn other_sign(sign: Sign) -> String {
         Sign::LeftMinusRight => "right-minus-left",
         Sign::RightMinusLeft => "left-minus-right",
     };
-    format!("they may count the other way: give --sign {other}")
+    format!("they may have the opposite sign: try --sign {other}")
 }
 
 /// Why no disparity in front of the cameras has a depth, or gives one of the `points` that are wanted, and what helps.

@@ -200,7 +200,7 @@ fn plain(line: &str, measures: bool) -> String {
     let is_number = |word: &str| word.trim_end_matches([',', ':']).parse::<f64>().is_ok();
     let shown = words.iter().enumerate().map(|(i, word)| {
         let of_machine =
-            ["s", "s:", "thread", "threads"].contains(&next(i)) || next(i) == "a" && next(i + 1) == "second";
+            ["s", "s:", "thread", "threads"].contains(&next(i)) || next(i) == "per" && next(i + 1) == "second";
         match *word {
             "thread" => "threads",
             word if is_number(word) && (measures || of_machine) => "N",

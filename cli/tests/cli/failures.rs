@@ -286,7 +286,7 @@ const FAILURES: &[Failure] = &[
     (
         "evaluate map misfit/disp0GT.pfm --truth misfit/disp0GT.pfm --json misfit/disp0GT.pfm",
         2,
-        "--json & misfit/disp0GT.pfm is an input & another name",
+        "--json & misfit/disp0GT.pfm is already an input & another name",
     ),
     // Batches.
     ("batch", 2, "<LIST> <OUTDIR> & mrfgs batch --help"),

@@ -213,15 +213,15 @@ fn maps_behind_the_cameras_are_reported() {
 fn depths_that_come_out_empty() {
     let folder = Folder::new();
     let negative = "--min-disparity -31 --max-disparity -1";
-    let front = "disparities are of nothing in front of the cameras";
+    let front = "disparities lie behind the cameras";
     for (more, words) in [
         (
             format!("{negative} --also depth,points"),
-            format!("warning: & {front} & give --sign right-minus-left, or exchange the two images"),
+            format!("warning: & {front} & try --sign right-minus-left, or exchange the two images"),
         ),
         (
             format!("{negative} --sign left-minus-right --also points"),
-            format!("{front} & give --sign right-minus-left"),
+            format!("{front} & try --sign right-minus-left"),
         ),
         (
             "--min-disparity 0 --max-disparity 0 --also depth".into(),

@@ -474,7 +474,7 @@ fn faulty_recordings_are_reported_in_one_line() {
         ("huge.mcap OUT", 1, 2, "4294967295 x 4294967295 pixels"),
         ("short.mcap OUT", 1, 2, "100 rows of 192 bytes"),
         ("cut-message.mcap OUT", 1, 2, "/left/image_rect & ends early"),
-        ("half.mcap OUT", 1, 0, "/left/image_rect alone"),
+        ("half.mcap OUT", 1, 0, "/left/image_rect only"),
         ("raw.mcap OUT", 1, 0, "/left/image_raw is not rectified & /left/camera_info & --rectify"),
         ("size.mcap OUT", 1, 0, "size.mcap:/left/camera_info & 128 x 100 & 64 x 48"),
         ("both.mcap OUT", 1, 0, "several pairs & --topics & /left/image_raw,/right/image_raw"),
