@@ -29,9 +29,7 @@ impl InFront {
         let Self { all, seen, negated } = self;
         let remedy = if negated > seen { turned } else { check };
         let behind = all - seen;
-        (2 * seen < all).then(|| {
-            format!("{behind} of {all} disparities lie behind the cameras; {remedy}")
-        })
+        (2 * seen < all).then(|| format!("{behind} of {all} disparities lie behind the cameras; {remedy}"))
     }
 }
 

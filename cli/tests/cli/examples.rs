@@ -199,8 +199,8 @@ fn plain(line: &str, measures: bool) -> String {
     let next = |i: usize| words.get(i + 1).copied().unwrap_or_default();
     let is_number = |word: &str| word.trim_end_matches([',', ':']).parse::<f64>().is_ok();
     let shown = words.iter().enumerate().map(|(i, word)| {
-        let of_machine =
-            ["s", "s:", "thread", "threads"].contains(&next(i)) || next(i) == "per" && next(i + 1) == "second";
+        let of_machine = ["s", "s:", "thread", "threads"].contains(&next(i))
+            || next(i) == "per" && next(i + 1) == "second";
         match *word {
             "thread" => "threads",
             word if is_number(word) && (measures || of_machine) => "N",
