@@ -8,7 +8,6 @@ use crate::plan::patches::{self, PATCH, PATCH_WORDS};
 use crate::plan::votes::{self, Votes};
 use crate::plan::{Plan, ROW_ALIGN};
 use crate::weights::{MedianWeights, patch_weights, vote_weights};
-use std::collections::HashSet;
 use std::ops::Range;
 
 /// Marks pixels of the right view to which no left pixel projects.
@@ -383,7 +382,8 @@ impl Data {
             Array::table(name, padded(runs * rows))
         };
         let height = plan.levels[0].height;
-        let constant = |name| Array::table(name, self.constant(plan).len()).starting(Constant);
+        // As long as its words are, which take time to compute.
+        let constant = |name| Array::table(name, 0).starting(Constant);
         let votes_of = |name, labels: usize| {
             rows(name, padded(votes().width * labels), Extent::Half).place(Place::AnyVolume)
         };
@@ -560,9 +560,11 @@ impl Data {
     /// The data that belong to no level, one for each array of `plan`.
     #[must_use]
     pub fn arrays_of_match(plan: &Plan) -> Vec<Self> {
-        let mut names = HashSet::new();
-        let there = Self::of_match().into_iter().filter(|data| data.is_there(plan));
-        there.filter(|data| names.insert(data.array(plan).name)).collect()
+        let shares = |data: &Self| {
+            use Map::{Best, Confidence, FullConfidence, RightBest, RunnerUp};
+            matches!(data, Self::Map(Best | RunnerUp | RightBest | Confidence | FullConfidence))
+        };
+        Self::of_match().into_iter().filter(|data| !shares(data) && data.is_there(plan)).collect()
     }
 
     /// All data of a match by `plan`.

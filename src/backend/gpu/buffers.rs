@@ -152,7 +152,8 @@ impl Buffers {
             let rows = match array.place {
                 Place::In(other) => arrays[&(other.array(plan).name, 0)].1.clone(),
                 _ if array.start == Start::Constant => {
-                    Rows::of(a.constant(array.name, &data.constant(plan))?, array.words as u32)
+                    let words = data.constant(plan);
+                    Rows::of(a.constant(array.name, &words)?, words.len() as u32)
                 }
                 _ => Self::rows_of_match(a, plan, &array)?,
             };
