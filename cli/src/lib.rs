@@ -46,7 +46,7 @@ Examples:
   mrfgs match left.png right.png disparity.pfm --max-disparity 63
   mrfgs match im0.png im1.png disparity.png   # range: calib.txt beside im0.png
   mrfgs rectify left.png right.png rectified --calib stereo.yml
-  mrfgs batch pairs.csv maps                  # many pairs; run it again to resume
+  mrfgs batch pairs.csv maps                  # many pairs; again to resume
   mrfgs sequence left right maps              # the frames of a video
   mrfgs ros --method fast --also points       # live from two ROS 2 cameras
   mrfgs evaluate Teddy Cones --json figures.json
