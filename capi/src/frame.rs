@@ -201,7 +201,7 @@ pub(crate) unsafe fn pair(images: [*const Image; 2], masks: [*const Image; 2]) -
 /// The pair of two raw images, which may differ in size.
 ///
 /// # Safety
-/// As for [`pair`].
+/// Each image is null, or valid as `mrfgs_image` demands.
 pub(crate) unsafe fn raw_pair(images: [*const Image; 2]) -> Result<Pair, Failure> {
     // SAFETY: guaranteed by the caller.
     let [left, right] = unsafe { rasters(images, [std::ptr::null(); 2]) }?;
@@ -209,7 +209,7 @@ pub(crate) unsafe fn raw_pair(images: [*const Image; 2]) -> Result<Pair, Failure
 }
 
 /// # Safety
-/// As for [`pair`].
+/// Each image is null, or valid as `mrfgs_image` demands.
 unsafe fn rasters<'a>(
     images: [*const Image; 2],
     masks: [*const Image; 2],

@@ -1,4 +1,4 @@
-//! What the paper derives from a pair besides: its illumination corrected, and labels limited by texture zones.
+//! Steps of the paper before a match: corrects the illumination, and limits labels by texture zones.
 
 use super::illumination::homomorphic;
 use super::prepared::Prepared;

@@ -1,4 +1,4 @@
-//! What a match needs of a pair.
+//! A pair that is prepared for a match.
 
 #[cfg(feature = "paper")]
 use super::{matches::SparseMatch, zones::Zones};

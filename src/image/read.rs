@@ -100,7 +100,7 @@ impl Reader {
     /// Like [`Reader::both`], of raw images, which may differ in size: see [`Pair::of_raw_frames`].
     ///
     /// # Errors
-    /// Those of [`Reader::both`], but for the sizes.
+    /// The errors of [`Reader::both`], except for views of two sizes.
     pub fn raw_both(self, file: &Path, mask: Option<&Path>) -> Result<(Pair, bool)> {
         self.both_of(file, mask, Sizes::Any)
     }

@@ -91,14 +91,14 @@ pub(super) enum Value<'a> {
     Whole(i64),
     /// A real number.
     Real(f64),
-    /// What no key takes.
+    /// A value of a type that no option has.
     #[cfg(feature = "files")]
     Other,
 }
 
 /// A type of a field.
 pub(super) trait Stored: Copy {
-    /// What it holds.
+    /// The contained value.
     fn value(self) -> Value<'static>;
 }
 

@@ -4,139 +4,13 @@
 //! the image rows that its rows cover. Buffers, bindings, the memory of a plan, and tests of descriptors
 //! follow from it.
 
+use super::map::Map;
+use super::volume::Volume;
 use crate::plan::patches::{self, PATCH, PATCH_WORDS};
 use crate::plan::votes::{self, Votes};
 use crate::plan::{Plan, ROW_ALIGN};
 use crate::weights::{MedianWeights, patch_weights, vote_weights};
 use std::ops::Range;
-
-/// Marks pixels of the right view to which no left pixel projects.
-pub const NO_LABEL: u16 = u16::MAX;
-
-/// Stands for "no runner-up".
-pub const NO_RUNNER_UP: u16 = u16::MAX;
-
-/// A volume, in the unpadded layout \[y\]\[x\]\[slot\]\[label\] (slot only for dependency messages).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Volume {
-    /// Matching cost: in cost units at level 0, in 1/256 cost units at coarser levels.
-    Cost(usize),
-    /// Evidence e.
-    Evidence(usize),
-    /// Messages of the dependency factors to their members.
-    Dependency(usize),
-    /// Messages of the resolution factors above to the pixels of this level.
-    Down(usize),
-    /// Messages of the resolution factors of this level to their own, coarse pixel.
-    Up(usize),
-    /// Beliefs b.
-    Belief(usize),
-}
-
-impl Volume {
-    /// Whether a match with `levels` levels has it: the finest has no messages from below, the coarsest none from above.
-    #[must_use]
-    pub fn is_there(self, levels: usize) -> bool {
-        match self {
-            Self::Down(z) => z + 1 < levels,
-            Self::Up(z) => z > 0,
-            other => other.level() < levels,
-        }
-    }
-
-    /// Bytes per stored value.
-    #[must_use]
-    pub fn bytes(self, plan: &Plan) -> usize {
-        match self {
-            Self::Cost(0) | Self::Evidence(_) => 1,
-            Self::Cost(_) => 2,
-            _ => plan.volume_width.bytes(),
-        }
-    }
-
-    /// The level that it belongs to.
-    #[must_use]
-    pub fn level(self) -> usize {
-        match self {
-            Self::Cost(z)
-            | Self::Evidence(z)
-            | Self::Dependency(z)
-            | Self::Down(z)
-            | Self::Up(z)
-            | Self::Belief(z) => z,
-        }
-    }
-}
-
-/// An intermediate or final map of a match, one value per pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Map {
-    /// Index of the label with the smallest belief, the lowest on ties.
-    Label,
-    /// Belief of that label, in units.
-    Best,
-    /// The smallest belief of labels more than one away from it; [`NO_RUNNER_UP`] if there are none.
-    RunnerUp,
-    /// Label index of each pixel of the right view; [`NO_LABEL`] where no left pixel projects.
-    RightLabel,
-    /// Belief of that label, in units; [`u16::MAX`] where no left pixel projects.
-    RightBest,
-    /// Disparity before post-processing, in 1/256 px.
-    Raw,
-    /// Disparity after the post-processing so far, in 1/256 px.
-    Disparity,
-    /// Bits of [`crate::maps::flag`].
-    Validity,
-    /// Confidence, 0 ..= 255.
-    Confidence,
-    /// [`Self::Raw`] at full size, if the pair is matched at half its size.
-    FullRaw,
-    /// [`Self::Disparity`] at full size.
-    FullDisparity,
-    /// [`Self::Validity`] at full size.
-    FullValidity,
-    /// [`Self::Confidence`] at full size.
-    FullConfidence,
-}
-
-impl Map {
-    /// Every map of the size of the finest level.
-    pub const MATCHED: [Self; 9] = [
-        Self::Label,
-        Self::Best,
-        Self::RunnerUp,
-        Self::RightLabel,
-        Self::RightBest,
-        Self::Raw,
-        Self::Disparity,
-        Self::Validity,
-        Self::Confidence,
-    ];
-
-    /// Every map of the full size.
-    pub const FULL: [Self; 4] =
-        [Self::FullRaw, Self::FullDisparity, Self::FullValidity, Self::FullConfidence];
-
-    /// Every map of a match by `plan`.
-    #[must_use]
-    pub fn all(plan: &Plan) -> Vec<Self> {
-        let full: &[Self] = if plan.full.is_some() { &Self::FULL } else { &[] };
-        [&Self::MATCHED, full].concat()
-    }
-
-    /// Words per pixel of the device array that holds this map, shared with other maps.
-    #[must_use]
-    pub fn words(self) -> usize {
-        if matches!(self, Self::Label | Self::Best | Self::RunnerUp) { 2 } else { 1 }
-    }
-
-    /// (width, height) in pixels. At full size, the blocks of 2 x 2 pixels are whole.
-    #[must_use]
-    pub fn size(self, plan: &Plan) -> (usize, usize) {
-        let (width, height) = plan.size();
-        if Self::FULL.contains(&self) { (2 * width, 2 * height) } else { (width, height) }
-    }
-}
 
 /// Anything that stages read or write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -298,7 +172,7 @@ pub enum Start {
     Zero,
     /// Part of the input: the pair, or data from the front end.
     Given,
-    /// The same for every match of the plan.
+    /// Constants that are equal in all matches by a plan.
     Constant,
 }
 
@@ -382,7 +256,7 @@ impl Data {
             Array::table(name, padded(runs * rows))
         };
         let height = plan.levels[0].height;
-        // As long as its words are, which take time to compute.
+        // The length is left out, since the words take time to compute.
         let constant = |name| Array::table(name, 0).starting(Constant);
         let votes_of = |name, labels: usize| {
             rows(name, padded(votes().width * labels), Extent::Half).place(Place::AnyVolume)
@@ -628,54 +502,6 @@ impl Data {
         match self {
             Self::Volume(volume) => Some(volume),
             _ => None,
-        }
-    }
-}
-
-/// (rows of labels, labels per row, labels per row with padding) of `volume`.
-#[must_use]
-pub fn volume_shape(plan: &Plan, volume: Volume) -> (usize, usize, usize) {
-    let rows = if matches!(volume, Volume::Dependency(_)) { plan.slots() } else { 1 };
-    let level = &plan.levels[volume.level()];
-    (level.pixels() * rows, level.labels, level.stride)
-}
-
-/// Values of a volume as rows of labels, for storage with padding.
-pub(crate) struct PaddedRows<'a> {
-    values: &'a [u32],
-    labels: usize,
-    stride: usize,
-    /// Lower bound of the padding, which is also at least the largest value of the row.
-    least: u32,
-}
-
-impl<'a> PaddedRows<'a> {
-    pub(crate) fn new(plan: &Plan, volume: Volume, values: &'a [u32]) -> Self {
-        let (rows, labels, stride) = volume_shape(plan, volume);
-        assert_eq!(values.len(), rows * labels, "values of {volume:?}");
-        // Padding must never be better than a label, even after a message is subtracted from a belief.
-        let least = match volume {
-            Volume::Belief(_) => plan.volume_width.most().into(),
-            _ => 0,
-        };
-        Self { values, labels, stride, least }
-    }
-
-    /// Rows of `stride` values each.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = Vec<u32>> {
-        self.values.chunks_exact(self.labels).map(|row| {
-            let padding = row.iter().copied().max().unwrap_or(0).max(self.least);
-            let mut row = row.to_vec();
-            row.resize(self.stride, padding);
-            row
-        })
-    }
-
-    pub(crate) fn fill<T>(&self, out: &mut [T], convert: impl Fn(u32) -> T) {
-        for (out, row) in out.chunks_exact_mut(self.stride).zip(self.iter()) {
-            for (out, value) in out.iter_mut().zip(row) {
-                *out = convert(value);
-            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! All maps of a match in progress, from the labels on.
 
 use super::Map;
-use super::data::NO_RUNNER_UP;
+use super::map::NO_RUNNER_UP;
 use crate::image::{Plane, Rect};
 use crate::maps::Maps;
 use crate::plan::Plan;

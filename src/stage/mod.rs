@@ -6,14 +6,18 @@
 //! generated from this table.
 
 mod data;
+mod map;
 mod map_set;
 mod memory;
+mod volume;
 
 use crate::options::Method;
 use crate::plan::Plan;
-pub(crate) use data::PaddedRows;
-pub use data::{Array, Data, Extent, Map, NO_LABEL, NO_RUNNER_UP, Place, Start, Volume, volume_shape};
+pub use data::{Array, Data, Extent, Place, Start};
+pub use map::{Map, NO_LABEL, NO_RUNNER_UP};
 pub(crate) use map_set::{MapSet, Optimum};
+pub(crate) use volume::PaddedRows;
+pub use volume::{Volume, volume_shape};
 
 /// Calls the macro `$then` with all rows: stages that run at a level, stages on the volumes of level 0 (in
 /// both groups, those that can run on bands of rows come separately), and map stages in the order of a match.

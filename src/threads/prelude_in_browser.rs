@@ -60,7 +60,7 @@ pub(crate) trait IntoLoop: IntoIterator + Sized {
 
 impl<I: IntoIterator> IntoLoop for I {}
 
-/// What such loops can do and iterators cannot.
+/// Methods of parallel iterators that plain iterators lack.
 pub(crate) trait Loop: Iterator + Sized {
     fn with_min_len(self, _: usize) -> Self {
         self

@@ -24,7 +24,7 @@ impl InFront {
         Self { all: known().count(), seen: seen(1.0), negated: seen(-1.0) }
     }
 
-    /// What to say where most is behind the cameras: `turned` helps where the other sign does, and else `check`.
+    /// A warning if most disparities lie behind the cameras, with the remedy `turned` if the opposite sign helps, and `check` if not.
     pub(crate) fn doubt(self, turned: &str, check: &str) -> Option<String> {
         let Self { all, seen, negated } = self;
         let remedy = if negated > seen { turned } else { check };

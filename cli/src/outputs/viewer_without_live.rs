@@ -7,7 +7,7 @@ use mrfgs_ros::messages::Header;
 
 use crate::outputs::messages::{Content, Messages};
 
-/// What is missing, and what helps.
+/// The error message that names the missing feature and the remedy.
 pub(crate) const WITHOUT_LIVE: &str = "this program was built without the feature `live`: take one of its packages, or build it with \
      `cargo install --locked mrfgs-cli --features live`";
 

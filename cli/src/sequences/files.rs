@@ -55,7 +55,7 @@ fn in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 fn of_pattern(path: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
-    // As in shells, * does not match hidden files.
+    // `*` does not match hidden files, as in shells.
     let options = glob::MatchOptions {
         require_literal_separator: true,
         require_literal_leading_dot: true,
@@ -90,7 +90,7 @@ fn of_numbers(path: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
     }
     let [start, end] = [before, after].map(glob::Pattern::escape);
     let mut found = of_pattern(path, &format!("{start}*{end}"))?;
-    // As in printf, a number with more digits than the width has no leading zeros.
+    // A number with more digits than the width has no leading zeros, as in printf.
     let fits = |number: &str| {
         let few = digits == 1 || number.len() == digits;
         let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());

@@ -118,7 +118,7 @@ impl Participant {
     }
 }
 
-/// What ROS calls a topic in DDS: `rt/disparity`.
+/// The DDS name of a ROS topic, such as `rt/disparity`.
 fn full(name: &str) -> String {
     format!("rt{name}")
 }
@@ -238,7 +238,7 @@ pub struct Announcement {
     _publication: Publication,
 }
 
-/// Those that publish in a domain: the topic of each, and its type, as DDS calls them.
+/// The publishers in a domain, each with the DDS names of its topic and its type.
 #[derive(Default)]
 struct Writers(Mutex<HashMap<GUID, [String; 2]>>);
 

@@ -253,7 +253,7 @@ fn write_outputs(
     for (word, path) in also {
         said.extend(written.note(path, args.also.write(word, path, outcome))?);
     }
-    // The same points in several formats give the same remark.
+    // Report each remark once, even if the points are written in several formats.
     said.dedup();
     let json =
         args.json.as_deref().map(|path: &Path| Ok::<_, Failure>((path, files::json_text(path, record)?)));

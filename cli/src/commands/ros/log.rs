@@ -142,7 +142,7 @@ impl Log {
     }
 }
 
-/// What to say of a topic whose messages are of another type.
+/// The warning about a topic whose messages have an unexpected type.
 fn mistyped(name: &str, expected: &str, found: &str) -> String {
     let remedy = if [expected, found] == [Image::NAME, CompressedImage::NAME] {
         ", or one whose name ends with /compressed"
