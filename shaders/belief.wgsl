@@ -7,7 +7,9 @@ struct Params {
     @align(16) band: Band,
     // Largest belief; larger sums saturate at it.
     most: u32,
-    // Whether messages from above and below exist.
+    // Whether the dependency factors have sent messages.
+    sent: u32,
+    // Whether there are messages from above and below.
     has_down: u32,
     has_up: u32,
 }
@@ -63,6 +65,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if SLOTS > 1u {
         factors = incoming[params.level.incoming_at + id.y * params.level.pixel_pitch + x];
     }
+    factors *= params.sent;
     while (factors.x | factors.y) != 0u {
         let is_low = factors.x != 0u;
         let code = firstTrailingBit(select(factors.y, factors.x, is_low)) + select(32u, 0u, is_low);

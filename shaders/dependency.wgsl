@@ -10,6 +10,8 @@ struct Params {
     tau: u32,
     // Cost of labels that differ by one.
     step: u32,
+    // Whether the factors have sent messages; until then these are 0, whatever is stored.
+    sent: u32,
 }
 
 // Codes of the neighbours, four per word.
@@ -24,7 +26,7 @@ const ABSENT: u32 = 0xffffffffu;
 // truncation is absolute; infinite at labels that the member does not have.
 fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
     let b = unpack(belief[member]);
-    var q = b - unpack(dependency[message]);
+    var q = b - unpack(dependency[message]) * params.sent;
     if ABSOLUTE {
         q = max(q, vec4(least)) - vec4(least);
     }
@@ -64,6 +66,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
     }
     if present < 2u {
+        // Its messages stay 0.
+        for (var quad = spanned.x; quad < spanned.y && params.sent == 0u; quad++) {
+            dependency[own + quad * width] = pack(vec4<u32>());
+        }
         return;
     }
 

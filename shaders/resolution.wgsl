@@ -14,6 +14,8 @@ struct Params {
     tau: u32,
     // Offset of the volumes of the finer level in the bindings, in quads.
     fine_at: u32,
+    // Whether the factors have sent messages; until then these are 0, whatever is stored.
+    sent: u32,
 }
 
 @group(0) @binding(1) var<storage, read> fine_belief: array<u32>;
@@ -46,7 +48,7 @@ fn rewind() {
 // The values of a word of beliefs minus those of a word of messages, which are never larger; infinite where the belief is.
 fn less(beliefs: u32, messages: u32) -> u32 {
     let highest = TOPS & beliefs & ((beliefs & ~TOPS) + BOTTOMS);
-    return beliefs - (messages & ~((highest >> (BITS - 1u)) * MOST));
+    return beliefs - ((messages * params.sent) & ~((highest >> (BITS - 1u)) * MOST));
 }
 
 // The lowest and the highest bit of each value in a word.

@@ -13,7 +13,7 @@ use mrfgs::low_level::backend::gpu::{
 };
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::program::tiles::Tiles;
-use mrfgs::low_level::program::{Program, Step};
+use mrfgs::low_level::program::{Program, SentMessages, Step};
 use mrfgs::low_level::stage::{Data, Map, Start};
 use mrfgs::options::{DisparityRange, LeftRightCheck, Method};
 use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationFlags, Validator};
@@ -362,16 +362,19 @@ fn program_of(plan: &Plan) -> mrfgs::Result<Program> {
 /// Checks that each datum that `program` reads was written before, or was there from the start.
 fn check_order(program: &Program) -> Result<(), String> {
     let mut written = HashSet::new();
+    let mut messages = SentMessages::none(0);
     for (step, plan) in program.with_plans() {
         if let Step::Enter(_) | Step::Condition = step {
+            messages = SentMessages::none(plan.levels.len());
             written
                 .extend(Data::all(plan).into_iter().filter(|data| data.array(plan).start != Start::Anything));
             // Windows hold all labels until they are found.
             written.extend((0..plan.levels.len()).map(Data::Windows));
         }
-        // A level whose factors send no messages needs no graph, and a check that is off ignores the right view.
+        // A level whose factors send no messages needs no graph, messages that were not sent count as 0, and a check that is off ignores the right view.
         let counts = |data: &Data| match *data {
             Data::Members(z) | Data::Incoming(z) => plan.floods(z),
+            Data::Volume(volume) => !messages.lacks(volume),
             Data::Map(Map::RightLabel) => plan.method.refinement.left_right_check != LeftRightCheck::Off,
             _ => true,
         };
@@ -380,6 +383,7 @@ fn check_order(program: &Program) -> Result<(), String> {
                 return Err(format!("{stage:?} reads {data:?}, which nobody has written"));
             }
             written.extend(stage.writes());
+            messages.send(stage);
         }
     }
     Ok(())

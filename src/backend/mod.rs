@@ -24,12 +24,20 @@ use std::time::Duration;
 pub struct Traffic {
     /// Dispatches.
     pub dispatches: u64,
+    /// Compute passes.
+    pub passes: u64,
     /// Submissions to the queue.
     pub submissions: u64,
+    /// Times that the host waited for a submission.
+    pub waits: u64,
+    /// Buffers that were created, beside those of the plan.
+    pub buffers: u64,
     /// Bytes written to the device.
     pub bytes_up: u64,
     /// Bytes read from the device.
     pub bytes_down: u64,
+    /// Bytes zeroed on the device.
+    pub bytes_cleared: u64,
     /// Bytes of the buffers held for the match.
     pub bytes_held: u64,
 }
@@ -38,9 +46,13 @@ pub struct Traffic {
 impl std::ops::AddAssign for Traffic {
     fn add_assign(&mut self, more: Self) {
         self.dispatches += more.dispatches;
+        self.passes += more.passes;
         self.submissions += more.submissions;
+        self.waits += more.waits;
+        self.buffers += more.buffers;
         self.bytes_up += more.bytes_up;
         self.bytes_down += more.bytes_down;
+        self.bytes_cleared += more.bytes_cleared;
         self.bytes_held = self.bytes_held.max(more.bytes_held);
     }
 }

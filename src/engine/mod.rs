@@ -1,23 +1,26 @@
 //! Runs the steps of a match on a backend, with progress, cancelling, inspection and timing.
 
 mod double_size;
+mod gathering;
 mod mosaic;
+mod running;
+mod source;
 
-use crate::backend::cpu::Cpu;
-use crate::backend::{Backend, Map, Stage, Ticket, Traffic};
-use crate::error::{Purpose, Result};
+use crate::backend::{Backend, Stage, Traffic};
+use crate::error::Result;
 use crate::front::conditioning::Conditioning;
 use crate::front::{self, Prepared};
-use crate::image::{Pair, Plane};
-use crate::maps::{Maps, RightMap, flag};
-use crate::memory;
+use crate::image::Pair;
+use crate::maps::Maps;
 use crate::plan::Plan;
 use crate::program::{Frame, Program, Step, View};
 use crate::watch::{Followed, Observer, Progress, Watch};
+use gathering::Gathering;
 use mosaic::Mosaic;
+use running::Running;
+use source::Source;
 use std::ops::ControlFlow;
 use std::time::Duration;
-use web_time::Instant;
 
 /// The result of a match.
 #[derive(Clone, Debug)]
@@ -80,7 +83,7 @@ pub async fn start(
     pair: &Pair,
     observer: Observer<'_>,
 ) -> Result<MatchRun> {
-    let mut started = MatchRun::new(backend, program, false);
+    let mut started = MatchRun { overlaps: true, ..MatchRun::new(backend, program, false) };
     started.advance(backend, pair, observer, None, Some(Step::Collect)).await?;
     Ok(started)
 }
@@ -101,38 +104,11 @@ pub struct MatchRun {
     /// The next step.
     next: usize,
     followed: Followed,
-    /// The pair that is matched, and the part of it that the backend holds.
-    pair: Option<Pair>,
-    part: Option<Pair>,
-    /// The frame that was entered last, and whether the backend's work for it has been counted.
-    frame: usize,
-    is_counted: bool,
-    /// The frame of the whole image.
-    whole: usize,
-    /// Iterations of the frame, and the most of any at this size.
-    iterations: u32,
-    most_iterations: u32,
-    /// Whether the pair is at twice its size.
-    doubled: bool,
-    mosaic: Option<Mosaic>,
-    /// After all tiles: the CPU path for the stages on whole maps, and the disparities of the right view.
-    gathered: Option<(Cpu, Plane<i32>)>,
-    tickets: Vec<(View, Ticket)>,
-    /// The maps that were found so far.
-    found: Option<Maps>,
-    solution: Partial,
-}
-
-/// The parts of a [`Solution`] that are complete.
-#[derive(Default)]
-struct Partial {
-    /// The maps at the pair's own size, while it is matched at twice its size.
-    own: Option<Maps>,
-    iterations: u32,
-    conditioning: Conditioning,
-    mosaic_times: Vec<(Stage, Duration)>,
-    traffic: Traffic,
-    cells: Vec<u64>,
+    /// Whether other matches use the backend meanwhile, so that this one does not wait for it between stages.
+    overlaps: bool,
+    source: Source,
+    running: Running,
+    gathering: Gathering,
 }
 
 impl MatchRun {
@@ -140,36 +116,20 @@ impl MatchRun {
         // An inspected match runs the unfused program, so that the inspector sees complete levels.
         let program = if inspected { program.clone() } else { backend.fit(program.clone()) };
         let followed = Followed::new(program.work());
-        Self {
-            program,
-            next: 0,
-            followed,
-            pair: None,
-            part: None,
-            frame: 0,
-            is_counted: true,
-            whole: 0,
-            iterations: 0,
-            most_iterations: 0,
-            doubled: false,
-            mosaic: None,
-            gathered: None,
-            tickets: Vec::new(),
-            found: None,
-            solution: Partial::default(),
-        }
+        let (source, running, gathering) = Default::default();
+        Self { program, next: 0, followed, overlaps: false, source, running, gathering }
     }
 
     fn solution(self) -> Solution {
-        let Partial { iterations, conditioning, mosaic_times, traffic, cells, .. } = self.solution;
+        let Self { followed, source, running, gathering, .. } = self;
         Solution {
-            maps: self.found.expect("a list that collects maps"),
-            iterations: iterations + self.most_iterations,
-            conditioning,
-            host_times: self.followed.times,
-            mosaic_times,
-            traffic,
-            cells,
+            maps: gathering.maps.expect("a list that collects maps"),
+            iterations: running.earlier_iterations + running.most_iterations,
+            conditioning: source.conditioning,
+            host_times: followed.times,
+            mosaic_times: gathering.times,
+            traffic: running.traffic,
+            cells: running.cells,
         }
     }
 
@@ -188,14 +148,14 @@ impl MatchRun {
                 break;
             }
             self.next += 1;
-            let looks_in = !self.doubled && !self.program.frames[self.frame].mirrored;
+            let looks_in = !self.source.is_double && !self.frame().mirrored;
             let inspector =
                 inspector.as_mut().filter(|_| looks_in).map(|inspector| &mut **inspector as Inspector);
             self.step(step, backend, original, &mut watch, inspector).await?;
         }
         if until.is_some() {
             // The next match may use the backend before this one is completed.
-            self.leave(backend);
+            self.count(backend);
         }
         self.followed = watch.followed;
         Ok(())
@@ -214,172 +174,104 @@ impl MatchRun {
             Some(inspector) => inspector(inspection),
             None => Ok(()),
         };
+        let Self { program, source, running, gathering, .. } = self;
+        let plan = &program.frames[running.frame].plan;
         match step {
-            Step::Condition => {
-                let (pair, conditioning) = front::condition(original, self.plan(), watch)?;
-                (self.pair, self.solution.conditioning) = (Some(pair), conditioning);
-            }
+            Step::Condition => source.condition(original, plan, watch)?,
             Step::Double => {
-                let conditioning = &self.solution.conditioning;
-                self.pair = Some(watch.host("double_size", || front::doubled(original, conditioning))?);
-                (self.solution.own, self.doubled) = (self.found.take(), true);
-                self.solution.iterations = std::mem::take(&mut self.most_iterations);
-            }
-            Step::Mosaic(frame) => {
-                self.whole = frame;
-                self.mosaic = Some(Mosaic::new(&self.program.frames[frame].plan, self.pair())?);
+                source.double(original, watch)?;
+                gathering.put_aside();
+                running.end_size();
             }
             Step::Enter(frame) => {
-                self.leave(backend);
-                self.frame = frame;
-                let frame = &self.program.frames[frame];
-                if frame.tile.is_none() {
-                    self.whole = self.frame;
-                }
-                watch.followed.tile = frame.tile;
-                let pair = part(self.pair(), frame)?;
-                backend.release();
-                let prepared = front::prepare(pair, &frame.plan, watch)?;
-                self.part = self.mosaic.is_some().then(|| prepared.pair.clone());
-                if !frame.mirrored {
+                self.count(backend);
+                let prepared = self.enter(frame, backend, watch)?;
+                if !self.frame().mirrored {
                     inspect(&mut Inspection::Prepared(&prepared))?;
                 }
-                watch.host("upload", || backend.prepare(&frame.plan, prepared))?;
-                (self.is_counted, self.iterations) = (false, 0);
+                watch.host("upload", || backend.prepare(self.plan(), prepared))?;
             }
             Step::Run(run) => {
-                watch.begin(run.stage.name(), run.work(self.plan()))?;
-                let target = self.target(backend);
+                watch.begin(run.stage.name(), run.work(plan))?;
+                let target = gathering.target(backend);
                 target.perform(&run)?;
-                target.keep_up().await?;
+                // A browser's thread has other tasks.
+                if !self.overlaps || cfg!(target_arch = "wasm32") {
+                    target.keep_up().await?;
+                }
                 inspect(&mut Inspection::Stage(target, run.stage))?;
             }
-            Step::Free(data) => self.target(backend).free(data),
+            Step::Free(data) => gathering.target(backend).free(data),
             Step::Iteration => {
-                self.iterations += 1;
-                inspect(&mut Inspection::Iteration(backend, self.iterations))?;
+                running.iterations += 1;
+                inspect(&mut Inspection::Iteration(backend, running.iterations))?;
             }
             // With an inspector, wait for convergence, so that no idle iteration is reported.
             Step::Settled => {
                 if backend.settled(looks_in).await? {
-                    let rest = &self.program.steps[self.next..];
+                    let rest = &program.steps[self.next..];
                     self.next += rest.iter().position(|step| *step == Step::EndOfPhase).unwrap_or(0);
                 }
             }
             Step::EndOfPhase => {}
+            Step::Mosaic(frame) => {
+                gathering.whole = frame;
+                gathering.mosaic = Some(Mosaic::new(&program.frames[frame].plan, source.pair())?);
+            }
             Step::Place(view) => {
                 if view == View::Left {
-                    let idle = backend.idle_iterations().await?;
-                    self.most_iterations = self.most_iterations.max(self.iterations - idle);
+                    running.settle(backend.idle_iterations().await?);
                 }
                 backend.wait().await?;
-                let mosaic = self.mosaic.as_mut().expect("maps to place them in");
-                let pair = self.part.as_ref().expect("a frame was entered");
-                let placed = mosaic.place(&self.program.frames[self.frame], view, pair, backend);
+                let placed = gathering.place(&program.frames[running.frame], view, source.part(), backend);
                 watch.host_async("download", placed).await?;
             }
             Step::Gather => {
-                self.leave(backend);
+                self.count(backend);
                 watch.followed.tile = None;
-                let (mut cpu, right) = self.mosaic.take().expect("maps to gather").gathered();
-                cpu.keep_time(true)?;
-                self.gathered = Some((cpu, right));
+                self.gathering.gather()?;
             }
-            Step::PlaceRight => {
-                let (cpu, right) = self.gathered.as_mut().expect("maps of all tiles");
-                let raw = std::mem::replace(right, Plane::filled(0, 0, 0)).mirrored();
-                for map in [Map::Raw, Map::Disparity] {
-                    cpu.probe().write_map(map, &raw)?;
-                }
-            }
-            Step::Ask(view) => {
-                let ticket = self.target(backend).request_maps()?;
-                self.tickets.push((view, ticket));
-            }
+            Step::PlaceRight => gathering.place_right()?,
+            Step::Ask(view) => gathering.ask(view, backend)?,
             Step::Collect => {
-                let tickets = std::mem::take(&mut self.tickets);
-                let target = self.target(backend);
-                target.wait().await?;
-                let (maps, idle) = watch.host_async("download", collect(target, tickets)).await?;
-                self.found = Some(maps.cut_to(self.program.frames[self.whole].plan.of_pair().size));
-                if let Some((mut cpu, _)) = self.gathered.take() {
-                    self.solution.mosaic_times.extend(cpu.times().await?);
-                } else {
-                    self.most_iterations = self.iterations - idle;
+                let size = program.frames[gathering.whole].plan.of_pair().size;
+                if let Some(idle) = gathering.collect(size, backend, watch).await? {
+                    running.settle(idle);
                 }
-                self.leave(backend);
+                self.count(backend);
             }
-            Step::Join => {
-                let clock = Instant::now();
-                let double = self.found.take().expect("the maps at twice the size");
-                let mut own = self.solution.own.take().expect("the maps at the pair's own size");
-                double_size::take_in(&mut own, &double);
-                self.found = Some(own);
-                watch.followed.times.push(("double_size", clock.elapsed()));
-            }
+            Step::Join => gathering.join(watch),
         }
         Ok(())
     }
 
-    fn plan(&self) -> &Plan {
-        &self.program.frames[self.frame].plan
-    }
-
-    fn pair(&self) -> &Pair {
-        self.pair.as_ref().expect("the pair was conditioned")
-    }
-
-    /// The backend that runs the next stages.
-    fn target<'a>(&'a mut self, backend: &'a mut dyn Backend) -> &'a mut dyn Backend {
-        match &mut self.gathered {
-            Some((cpu, _)) => cpu,
-            None => backend,
+    /// Enters `frame`, and returns its prepared pair.
+    fn enter(&mut self, frame: usize, backend: &mut dyn Backend, watch: &mut Watch<'_>) -> Result<Prepared> {
+        let Self { program, source, running, gathering, .. } = self;
+        running.enter(frame);
+        let entered = &program.frames[frame];
+        if entered.tile.is_none() {
+            gathering.whole = frame;
         }
+        watch.followed.tile = entered.tile;
+        let pair = source.enter(entered)?;
+        backend.release();
+        let prepared = front::prepare(pair, &entered.plan, watch)?;
+        source.part = gathering.mosaic.is_some().then(|| prepared.pair.clone());
+        Ok(prepared)
+    }
+
+    fn frame(&self) -> &Frame {
+        &self.program.frames[self.running.frame]
+    }
+
+    fn plan(&self) -> &Plan {
+        &self.frame().plan
     }
 
     /// Counts the backend's work for the frame that was entered last.
-    fn leave(&mut self, backend: &dyn Backend) {
-        if std::mem::replace(&mut self.is_counted, true) {
-            return;
-        }
-        let solution = &mut self.solution;
-        solution.traffic += backend.traffic();
-        if !self.doubled && !self.program.frames[self.frame].mirrored {
-            let cells = backend.cells();
-            solution.cells.resize(cells.len(), 0);
-            solution.cells.iter_mut().zip(cells).for_each(|(sum, more)| *sum += more);
-        }
-    }
-}
-
-/// The part of `pair` that belongs to `frame`, if the memory holds a copy.
-fn part(pair: &Pair, frame: &Frame) -> Result<Pair> {
-    let copy = |make: &dyn Fn() -> Pair| {
-        memory::check(frame.plan.pair_bytes(), Purpose::Match)?;
-        Ok(make())
-    };
-    let crop = if frame.tile.is_none() { pair.clone() } else { copy(&|| pair.crop(&frame.crop))? };
-    if frame.mirrored { copy(&|| crop.mirrored()) } else { Ok(crop) }
-}
-
-/// The requested maps, and the number of idle iterations.
-async fn collect(backend: &mut dyn Backend, tickets: Vec<(View, Ticket)>) -> Result<(Maps, u32)> {
-    let mut all: Option<(Maps, u32)> = None;
-    for (_, ticket) in tickets {
-        let (maps, idle) = backend.maps(ticket).await?;
-        match &mut all {
-            Some((left, _)) => left.right = Some(right_map(maps)),
-            None => all = Some((maps, idle)),
-        }
-    }
-    Ok(all.expect("the left view was asked for"))
-}
-
-/// The map of the right view, from the maps of the mirrored pair.
-fn right_map(maps: Maps) -> RightMap {
-    RightMap {
-        disparity: maps.disparity.mirrored(),
-        // The runner-up of a right pixel is unknown.
-        validity: maps.validity.mirrored().map(|validity| validity & !flag::LOW_CONFIDENCE),
+    fn count(&mut self, backend: &dyn Backend) {
+        let own_size = !self.source.is_double && !self.frame().mirrored;
+        self.running.count(backend, own_size);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::image::Rect;
 use crate::plan::Plan;
-use crate::stage::{Data, Stage};
+use crate::stage::{Data, Stage, Volume};
 use std::ops::Range;
 
 /// A part of the pair that a backend matches at a time.
@@ -59,6 +59,57 @@ pub struct Sent {
     pub above: bool,
     /// Messages between the level and the next finer one.
     pub below: bool,
+}
+
+/// The messages of all levels that have been sent, followed from stage to stage.
+#[derive(Clone, Debug)]
+pub struct SentMessages {
+    /// Of the dependency factors of each level.
+    dependency: Vec<bool>,
+    /// Between each level and the next finer one.
+    resolution: Vec<bool>,
+}
+
+impl SentMessages {
+    /// No messages of `levels` levels.
+    #[must_use]
+    pub fn none(levels: usize) -> Self {
+        Self { dependency: vec![false; levels], resolution: vec![false; levels] }
+    }
+
+    /// The messages that exist at the level of `stage`.
+    #[must_use]
+    pub fn at(&self, stage: Stage) -> Sent {
+        let z = stage.level().unwrap_or(0);
+        let above = self.resolution.get(z + 1).is_some_and(|sent| *sent);
+        Sent { dependency: self.dependency[z], above, below: self.resolution[z] }
+    }
+
+    /// Adds the messages that `stage` sends.
+    pub fn send(&mut self, stage: Stage) {
+        stage.writes().filter_map(Data::volume).for_each(|volume| self.add(volume));
+    }
+
+    /// Adds the messages of `volume`; those between two levels are sent together.
+    pub fn add(&mut self, volume: Volume) {
+        match volume {
+            Volume::Dependency(z) => self.dependency[z] = true,
+            Volume::Up(z) => self.resolution[z] = true,
+            Volume::Down(z) => self.resolution[z + 1] = true,
+            _ => {}
+        }
+    }
+
+    /// Whether `volume` holds messages that have not been sent.
+    #[must_use]
+    pub fn lacks(&self, volume: Volume) -> bool {
+        match volume {
+            Volume::Dependency(z) => !self.dependency[z],
+            Volume::Up(z) => !self.resolution[z],
+            Volume::Down(z) => !self.resolution[z + 1],
+            _ => false,
+        }
+    }
 }
 
 /// One run of a stage.

@@ -22,4 +22,4 @@ pub mod tiled;
 pub mod tiles;
 pub mod together;
 
-pub use list::{Frame, Program, RowBand, Run, Sent, Step, View};
+pub use list::{Frame, Program, RowBand, Run, Sent, SentMessages, Step, View};

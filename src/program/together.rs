@@ -6,7 +6,7 @@
 //! needed. The results are the same as stage by stage.
 
 use super::schedule::{self, split};
-use super::{RowBand, Run, Sent, Step};
+use super::{RowBand, Run, Sent, SentMessages, Step};
 use crate::plan::Plan;
 use crate::stage::{Data, Stage, Volume};
 use std::ops::Range;
@@ -26,7 +26,7 @@ pub fn streamed(plan: &Plan) -> Plan {
 pub fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
     let Some((streamed, range, wavefront)) = going_together(plan, &steps) else { return steps };
     let mut all = steps[..range.start].to_vec();
-    let sent = sent(&steps[..range.start], &wavefront.stages);
+    let sent = sent(plan, &steps[..range.start], &wavefront.stages);
     all.extend(wavefront.bands().map(|(i, rows)| {
         let band = Some(RowBand { rows, sent: sent[i] });
         Step::Run(Run { stage: wavefront.stages[i], levels: 1, band })
@@ -65,21 +65,15 @@ fn goes_by_rows(stage: Stage) -> bool {
 }
 
 /// The messages that exist when each of `stages` starts, after the steps `before`.
-fn sent(before: &[Step], stages: &[Stage]) -> Vec<Sent> {
-    let mut past: Vec<Stage> =
-        before.iter().filter_map(Step::stage).flat_map(|s| split(s.into())).map(|run| run.stage).collect();
-    let mut all = Vec::new();
-    for &stage in stages {
-        let z = stage.level().unwrap_or(0);
-        let has = |sender: Stage| past.contains(&sender);
-        all.push(Sent {
-            dependency: has(Stage::Dependency(z)),
-            above: has(Stage::Resolution(z + 1)),
-            below: has(Stage::Resolution(z)),
-        });
-        past.push(stage);
-    }
-    all
+fn sent(plan: &Plan, before: &[Step], stages: &[Stage]) -> Vec<Sent> {
+    let mut messages = SentMessages::none(plan.levels.len());
+    before.iter().filter_map(Step::stage).for_each(|stage| messages.send(stage));
+    let each = stages.iter().map(|&stage| {
+        let sent = messages.at(stage);
+        messages.send(stage);
+        sent
+    });
+    each.collect()
 }
 
 /// Stages that move down the image together.

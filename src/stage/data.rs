@@ -265,9 +265,9 @@ impl Data {
             // datum                           name                words per pixel, and the rows covered
             Self::Volume(volume @ Volume::Cost(_)) => slots("cost", volume, 1),
             Self::Volume(volume @ Volume::Evidence(_)) => slots("evidence", volume, 1),
-            Self::Volume(volume @ Volume::Dependency(_)) => slots("dependency", volume, plan.slots()).starting(Zero),
-            Self::Volume(volume @ Volume::Down(_)) => slots("down", volume, 1).starting(Zero),
-            Self::Volume(volume @ Volume::Up(_)) => slots("up", volume, 1).starting(Zero),
+            Self::Volume(volume @ Volume::Dependency(_)) => slots("dependency", volume, plan.slots()),
+            Self::Volume(volume @ Volume::Down(_)) => slots("down", volume, 1),
+            Self::Volume(volume @ Volume::Up(_)) => slots("up", volume, 1),
             Self::Volume(volume @ Volume::Belief(_)) => slots("belief", volume, 1),
             Self::Guide(0) => level("left", 0, 4).starting(Given),
             Self::Guide(z) => level("guide", z, 4),

@@ -4,8 +4,8 @@ use super::units::Units;
 use super::volumes::Volumes;
 use super::windows::{Window, Windows};
 use super::{Cpu, on_volumes};
-use crate::backend::Map;
 use crate::backend::probe::Probe;
+use crate::backend::{Map, Stage};
 use crate::error::Result;
 use crate::graph::LevelGraph;
 use crate::image::Plane;
@@ -13,7 +13,6 @@ use crate::plan::LevelPlan;
 use crate::stage::{PaddedRows, Volume, volume_shape};
 use crate::threads::prelude::*;
 use std::hint::black_box;
-use std::mem;
 use web_time::Instant;
 
 /// Bytes that [`Cpu::copy_rate`] copies, and number of tries.
@@ -92,10 +91,10 @@ impl<U: Units> Volumes<U> {
         let wide = u16::from_ne_bytes([byte; 2]);
         self.fine_cost.fill(byte);
         self.labels.fill(wide);
+        Stage::all(&self.plan).into_iter().for_each(|stage| self.messages.send(stage));
         for level in &mut self.levels {
             level.cost.fill(wide);
             level.evidence.fill(byte);
-            (level.dependency_sent, level.resolution_sent) = (true, true);
             level.belief.fill(U::of(u32::from(wide) & Into::<u32>::into(U::MOST)));
             for messages in [&mut level.dependency, &mut level.down, &mut level.up] {
                 messages.fill(U::of(u32::from(wide) & Into::<u32>::into(U::MOST)));
@@ -107,12 +106,14 @@ impl<U: Units> Volumes<U> {
         }
     }
 
-    /// Marks the messages between level `z` and the next finer one as sent; unsent ones become 0.
-    fn store_resolution(&mut self, z: usize) {
-        if !mem::replace(&mut self.levels[z].resolution_sent, true) {
-            self.levels[z].up.fill(U::default());
-            self.levels[z - 1].down.fill(U::default());
+    /// Counts the messages of `volume` as sent; those between the same two levels are 0 unless they were sent.
+    fn send(&mut self, volume: Volume) {
+        if let (true, Volume::Up(z)) | (true, Volume::Down(z)) = (self.messages.lacks(volume), volume) {
+            let coarser = z + usize::from(volume == Volume::Down(z));
+            self.levels[coarser].up.fill(U::default());
+            self.levels[coarser - 1].down.fill(U::default());
         }
+        self.messages.add(volume);
     }
 
     fn read(&self, volume: Volume) -> Vec<u32> {
@@ -124,14 +125,10 @@ impl<U: Units> Volumes<U> {
             Volume::Cost(0) => gather(&self.fine_cost, labels, stride),
             Volume::Cost(_) => gather(&l.cost, labels, stride),
             Volume::Evidence(_) => self.gather_windows(z, &l.evidence, 1, u8::MAX.into()),
-            Volume::Dependency(_) if l.dependency_sent => {
-                self.gather_windows(z, &l.dependency, self.plan.slots(), dependency)
-            }
-            Volume::Down(_) if self.levels[z + 1].resolution_sent => {
-                self.gather_windows(z, &l.down, 1, resolution)
-            }
-            Volume::Up(_) if l.resolution_sent => self.gather_windows(z, &l.up, 1, resolution),
-            Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) => vec![0; rows * labels],
+            _ if self.messages.lacks(volume) => vec![0; rows * labels],
+            Volume::Dependency(_) => self.gather_windows(z, &l.dependency, self.plan.slots(), dependency),
+            Volume::Down(_) => self.gather_windows(z, &l.down, 1, resolution),
+            Volume::Up(_) => self.gather_windows(z, &l.up, 1, resolution),
             Volume::Belief(_) => self.gather_windows(z, &l.belief, 1, U::MOST.into()),
         }
     }
@@ -158,12 +155,7 @@ impl<U: Units> Volumes<U> {
 
     fn write(&mut self, volume: Volume, values: &[u32]) {
         let z = volume.level();
-        match volume {
-            Volume::Dependency(_) => self.levels[z].dependency_sent = true,
-            Volume::Down(_) => self.store_resolution(z + 1),
-            Volume::Up(_) => self.store_resolution(z),
-            _ => {}
-        }
+        self.send(volume);
         let padded = || PaddedRows::new(&self.plan, volume, values);
         let (plan, l) = (&self.plan.levels[z], &mut self.levels[z]);
         match volume {

@@ -10,7 +10,7 @@ use crate::front::Prepared;
 use crate::graph::LevelGraph;
 use crate::image::{Image, Pair, Plane};
 use crate::plan::Plan;
-use crate::program::Sent;
+use crate::program::{Sent, SentMessages};
 use crate::stage::{Data, MapSet, Volume};
 use std::mem;
 
@@ -23,6 +23,8 @@ pub(super) struct Volumes<U> {
     /// Cost of level 0, if stored; the costs of coarser levels are in `levels`.
     pub(super) fine_cost: Pages<u8>,
     pub(super) levels: Vec<Level<U>>,
+    /// The messages that were sent. All others count as 0, whatever is stored.
+    pub(super) messages: SentMessages,
     /// First and last label of each pixel, by level; empty if all labels are allowed.
     pub(super) label_ranges: Vec<Plane<[u16; 2]>>,
     /// The label map of the last [`Stage::Change`](crate::backend::Stage::Change), then the sum of squared
@@ -45,11 +47,6 @@ pub(super) struct Level<U> {
     pub(super) cost: Pages<u16>,
     pub(super) evidence: Pages<u8>,
     pub(super) dependency: Pages<U>,
-    /// Whether the dependency factors have sent messages. Until then all count as 0, whatever is stored.
-    pub(super) dependency_sent: bool,
-    /// Whether the resolution factors between this level and the next finer one have sent messages: `up` of
-    /// this level and `down` of the finer one.
-    pub(super) resolution_sent: bool,
     /// Empty at the coarsest level.
     pub(super) down: Pages<U>,
     /// Empty at level 0.
@@ -76,8 +73,6 @@ impl<U: Units> Volumes<U> {
                     cost: Pages::new(if plan.shares { 0 } else { cost })?,
                     evidence: Pages::new(cells)?,
                     dependency: Pages::new(shared.max(cells * plan.slots()))?,
-                    dependency_sent: false,
-                    resolution_sent: false,
                     down: Pages::new(if z == last { 0 } else { cells })?,
                     up: Pages::new(if z == 0 { 0 } else { cells })?,
                     belief: Pages::new(cells)?,
@@ -101,6 +96,7 @@ impl<U: Units> Volumes<U> {
             features: Features::default(),
             fine_cost: Pages::default(),
             levels: Vec::new(),
+            messages: SentMessages::none(plan.levels.len()),
             label_ranges: Vec::new(),
             labels: Vec::new(),
             change: None,
@@ -131,19 +127,8 @@ impl<U: Units> Volumes<U> {
 
     /// Starts a stage: returns the messages sent so far, and marks its own as sent.
     pub(super) fn begin(&mut self, stage: Stage) -> Sent {
-        let z = stage.level().unwrap_or(0);
-        let sent = Sent {
-            dependency: self.levels[z].dependency_sent,
-            above: self.levels.get(z + 1).is_some_and(|above| above.resolution_sent),
-            below: self.levels[z].resolution_sent,
-        };
-        for volume in stage.writes().filter_map(Data::volume) {
-            match volume {
-                Volume::Dependency(z) => self.levels[z].dependency_sent = true,
-                Volume::Up(z) => self.levels[z].resolution_sent = true,
-                _ => {}
-            }
-        }
+        let sent = self.messages.at(stage);
+        self.messages.send(stage);
         sent
     }
 
@@ -154,10 +139,10 @@ impl<U: Units> Volumes<U> {
         (self.pair, self.label_ranges) = (pair, label_ranges);
         self.labels.fill(0);
         (self.change, self.settled) = (None, false);
+        self.messages = SentMessages::none(plan.levels.len());
         for (z, (level, l)) in self.levels.iter_mut().zip(&plan.levels).enumerate() {
             (level.graph, level.guide) = (LevelGraph::default(), None);
             level.windows = Windows::full(l, plan.rows_held(z));
-            (level.dependency_sent, level.resolution_sent) = (false, false);
         }
     }
 }

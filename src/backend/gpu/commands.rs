@@ -8,6 +8,7 @@ use super::shader::{Shader, WORKGROUP, binding_number};
 use super::uniform::{self, Band, Header, Layout, LevelParams};
 use crate::error::{DeviceError, Result};
 use crate::plan::{LevelPlan, Plan};
+use crate::program::Sent;
 use crate::stage::{Data, Extent, Volume};
 use bytemuck::bytes_of;
 use std::collections::{BTreeSet, HashMap};
@@ -25,7 +26,8 @@ pub(super) struct Dispatch {
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) bind_group: wgpu::BindGroup,
     pub(super) groups: Groups,
-    /// Upper bound of the loop iterations of all invocations.
+    /// Approximate time on one thread of a processor, in ns. Until its run is [complete](Recorder::complete), only
+    /// its share counts: an upper bound of the loop iterations of all invocations.
     pub(super) work: u64,
 }
 
@@ -43,6 +45,30 @@ pub(super) struct Pipeline {
     inner: wgpu::ComputePipeline,
     /// The binding number of each of its names.
     numbers: Vec<u32>,
+}
+
+impl Pipeline {
+    /// Compiles `kernel`, on any thread.
+    pub(super) fn compiled(device: &wgpu::Device, kernel: &Kernel) -> Self {
+        let Kernel { shader, bound, .. } = kernel;
+        let source = shader.source();
+        let number =
+            |bound: &Bound| binding_number(&source, bound.name).expect("the shader has what is bound");
+        let numbers = bound.iter().map(number).collect();
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(shader.stage),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        });
+        let inner = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(shader.stage),
+            layout: None,
+            module: &module,
+            entry_point: Some(shader.entry),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        });
+        Self { inner, numbers }
+    }
 }
 
 /// Compiled kernels.
@@ -69,6 +95,8 @@ pub(super) struct Recorder<'a> {
     pub(super) level: usize,
     /// The rows of the level to record; `None` for all.
     pub(super) only: Option<Range<u32>>,
+    /// The messages that exist at each level from this one on; all if empty.
+    pub(super) sent: Vec<Sent>,
     /// The rows for bindings with the prefix `source_`; `None` for the rows of the dispatch.
     pub(super) source: Option<Range<u32>>,
     /// Collects the workgroup counts of dispatches that end once the label map has settled.
@@ -80,6 +108,12 @@ impl<'a> Recorder<'a> {
     /// The array of `data`.
     pub(super) fn array(&self, data: Data) -> &'a Rows {
         self.buffers.rows(self.plan, data)
+    }
+
+    /// The messages that exist at level `z` of the run.
+    pub(super) fn sent(&self, z: usize) -> Sent {
+        let all = Sent { dependency: true, above: z + 1 < self.plan.levels.len(), below: z > 0 };
+        self.sent.get(z - self.level).copied().unwrap_or(all)
     }
 
     /// The parameters of the level for shaders.
@@ -134,6 +168,21 @@ impl<'a> Recorder<'a> {
     /// Records copies.
     pub(super) fn copies(&mut self, copies: impl IntoIterator<Item = Copy>) {
         self.commands.extend(copies.into_iter().map(Command::Copy));
+    }
+
+    /// The commands, once they are those of a run that takes about `work` ns on one thread of a processor.
+    pub(super) fn complete(mut self, work: f64) -> Vec<Command> {
+        let dispatches = |commands: &mut [Command], change: &mut dyn FnMut(&mut u64)| {
+            for command in commands {
+                if let Command::Dispatch(dispatch) = command {
+                    change(&mut dispatch.work);
+                }
+            }
+        };
+        let mut shares = 0;
+        dispatches(&mut self.commands, &mut |share| shares += *share);
+        dispatches(&mut self.commands, &mut |share| *share = (work * *share as f64 / shares as f64) as u64);
+        self.commands
     }
 
     /// Replaces an array by its successor.
@@ -339,7 +388,7 @@ impl<'a> Recorder<'a> {
 
     /// The pipeline of `kernel`, compiled on first use.
     fn pipeline(&mut self, kernel: &Kernel) -> Result<Pipeline> {
-        let Kernel { shader, loops, bound, .. } = kernel;
+        let Kernel { shader, loops, .. } = kernel;
         if *loops > MAX_LOOP_ITERATIONS {
             let LevelPlan { width, height, labels, .. } = self.plan.levels[0];
             let (neighbours, shader) = (self.plan.neighbours, shader.stage);
@@ -348,25 +397,8 @@ impl<'a> Recorder<'a> {
         if let Some(pipeline) = self.pipelines.get(shader) {
             return Ok(pipeline.clone());
         }
-        let source = shader.source();
-        let number =
-            |bound: &Bound| binding_number(&source, bound.name).expect("the shader has what is bound");
-        let numbers = bound.iter().map(number).collect();
-        let device = self.device.inner()?;
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(shader.stage),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        });
-        let inner = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(shader.stage),
-            layout: None,
-            module: &module,
-            entry_point: Some(shader.entry),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
-        });
+        let pipeline = Pipeline::compiled(self.device.inner()?, kernel);
         self.device.check()?;
-        let pipeline = Pipeline { inner, numbers };
         self.pipelines.insert(shader.clone(), pipeline.clone());
         Ok(pipeline)
     }

@@ -68,6 +68,8 @@ pub(super) struct Device {
     /// Submissions so far, including those in flight.
     submitted: u64,
     failure: Arc<Mutex<Option<Error>>>,
+    /// Buffers for reading back that are not in use.
+    staging: Vec<wgpu::Buffer>,
     pub(super) traffic: Traffic,
 }
 
@@ -146,6 +148,7 @@ impl Device {
             last_end: Instant::now(),
             submitted: 0,
             failure,
+            staging: Vec::new(),
             traffic: Traffic::default(),
             open: Some((device, queue)),
             driver: driver(&info),
@@ -179,6 +182,20 @@ impl Device {
         let descriptor =
             wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
         Ok(self.inner()?.create_buffer(&descriptor))
+    }
+
+    /// A buffer of `size` bytes for reading back. [`Self::read`] keeps it for the next request of that size.
+    pub(super) fn staging(&mut self, size: u64) -> Result<wgpu::Buffer> {
+        if let Some(at) = self.staging.iter().position(|buffer| buffer.size() == size) {
+            return Ok(self.staging.swap_remove(at));
+        }
+        self.traffic.buffers += 1;
+        self.buffer("staging", size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST)
+    }
+
+    /// Frees the buffers for reading back that are not in use.
+    pub(super) fn free_staging(&mut self) {
+        self.staging.clear();
     }
 
     /// The error that a buffer, or its binding, for `what` exceeds the limit of this device.
@@ -234,6 +251,7 @@ impl Device {
         let Some(Submission { index, done, begun, is_full }) = self.under_way.pop_front() else {
             return Ok(());
         };
+        self.traffic.waits += 1;
         if cfg!(target_arch = "wasm32") {
             // The browser ends work that takes too long, and then the device is lost.
             done.await.map_err(|e| failed(&self.name, &e))?;
@@ -294,6 +312,7 @@ impl Device {
         // Any poll maps buffers whose submission has finished.
         self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
         let mut views = Vec::new();
+        let mut buffers = Vec::new();
         for (buffer, mut mapped) in requested.buffers {
             let answer =
                 if cfg!(target_arch = "wasm32") { mapped.await.map(Some) } else { mapped.try_recv() };
@@ -304,6 +323,7 @@ impl Device {
                 Err(e) => return Err(self.unread(&e)),
             }
             views.push(buffer.get_mapped_range(..).map_err(|e| self.unread(&e))?);
+            buffers.push(buffer);
         }
         let words = views.iter().map(|view| {
             // An empty view may be unaligned.
@@ -311,6 +331,9 @@ impl Device {
         });
         let words: Vec<&[u32]> = words.collect();
         let read = read(&words);
+        drop(views);
+        buffers.iter().for_each(wgpu::Buffer::unmap);
+        self.staging.append(&mut buffers);
         self.check()?;
         Ok(read)
     }

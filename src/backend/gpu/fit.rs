@@ -1,10 +1,11 @@
 //! Fits programs to a device: the rows of level 0 that it holds, and the commands of each run.
 
-use super::{Command, Gpu};
+use super::{Command, Gpu, State};
 use crate::error::{Purpose, Result};
 use crate::memory;
 use crate::plan::Plan;
-use crate::program::{Run, together};
+use crate::program::{Run, Sent, together};
+use crate::stage::Stage;
 use std::sync::Arc;
 
 impl Gpu {
@@ -23,17 +24,34 @@ impl Gpu {
                 && (!self.device.software || memory::check(bytes, Purpose::Match).is_ok())
     }
 
-    /// The commands of `run`, recorded on first use.
+    /// The commands of `run`, recorded on first use. Their messages count as sent from now on.
     pub(super) fn commands_of(&mut self, run: &Run) -> Result<Arc<[Command]>> {
         let mut state = self.state.take().expect("prepare comes before every stage");
-        let commands = match state.commands.get(run) {
+        let of_run = (run.clone(), sent(&state, run));
+        let commands = match state.commands.get(&of_run) {
             Some(commands) => Ok(Arc::clone(commands)),
-            None => self.recorded(run, &state.plan, &state.buffers, None),
+            None => self.recorded(run, &of_run.1, &state.plan, &state.buffers, None),
         };
         if let Ok(commands) = &commands {
-            state.commands.entry(run.clone()).or_insert_with(|| Arc::clone(commands));
+            run.stages().for_each(|stage| state.messages.send(stage));
+            state.commands.entry(of_run).or_insert_with(|| Arc::clone(commands));
         }
         self.state = Some(state);
         commands
     }
+}
+
+/// The messages that exist at each level of `run`; none listed if all do, or if it reads none.
+fn sent(state: &State, run: &Run) -> Vec<Sent> {
+    let (count, none) = (state.plan.levels.len(), Vec::new());
+    if !run.stage.passes_messages() {
+        return none;
+    }
+    let at = |stage| run.band.as_ref().map_or_else(|| state.messages.at(stage), |band| band.sent);
+    let all = |stage: Stage| {
+        let z = stage.level().unwrap_or(0);
+        Sent { dependency: true, above: z + 1 < count, below: z > 0 }
+    };
+    let sent: Vec<_> = run.stages().map(at).collect();
+    if run.stages().map(all).eq(sent.iter().copied()) { none } else { sent }
 }

@@ -35,17 +35,19 @@ use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{LevelPlan, Plan};
 use crate::program::schedule::split;
-use crate::program::{Program, Run, joined, sharing, together};
+use crate::program::{Program, Run, Sent, SentMessages, joined, sharing, together};
 use crate::stage::Data;
+use crate::threads::prelude::*;
 pub use adapters::{DeviceInfo, has_automatic_async, may_have_gpu};
 #[cfg(not(target_arch = "wasm32"))]
 pub use adapters::{devices, has_automatic};
 use buffers::Buffers;
-use commands::{Command, Pipelines, Recorder};
+use commands::{Command, Pipeline, Pipelines, Recorder};
 use convergence::Convergence;
 use device::Device;
 pub use device::FaultInjection;
 pub use kernel::{Bound, Kernel, MAX_LOOP_ITERATIONS};
+use queue::Recording;
 pub use shader::{Constant, Shader, binding_number};
 pub use stages::{kernels, other_kernels};
 use stages::{record, record_levels, record_upload};
@@ -62,9 +64,7 @@ use words::{full_words, image_words, label_range_words, narrow_words};
 pub struct Gpu {
     device: Device,
     pipelines: Pipelines,
-    encoder: Option<wgpu::CommandEncoder>,
-    passes: usize,
-    work: u64,
+    recording: Recording,
     timer: Option<Timer>,
     state: Option<State>,
     /// State of the other size of a double-size match, kept if both fit in memory.
@@ -72,14 +72,16 @@ pub struct Gpu {
     requests: Requests<RequestedMaps>,
 }
 
-/// The commands of each run.
-type Commands = HashMap<Run, Arc<[Command]>>;
+/// The commands of each run, by the messages that exist at each of its levels; none listed if all do.
+type Commands = HashMap<(Run, Vec<Sent>), Arc<[Command]>>;
 
 /// Everything that depends on the plan.
 struct State {
     plan: Plan,
     buffers: Buffers,
     commands: Commands,
+    /// The messages that were sent. All others count as 0, whatever is stored.
+    messages: SentMessages,
     /// The commands that upload the pair.
     upload: Arc<[Command]>,
     /// Words of an image, for upload.
@@ -115,14 +117,30 @@ impl Gpu {
         Ok(Self {
             device: Device::open(wanted, faults).await?,
             pipelines: HashMap::new(),
-            encoder: None,
-            passes: 0,
-            work: 0,
+            recording: Recording::default(),
             timer: None,
             state: None,
             other: None,
             requests: Requests::default(),
         })
+    }
+
+    /// Compiles the kernels of a match in parallel. Those that a stage takes in special cases are compiled on first use.
+    fn compile(&mut self, plan: &Plan) -> Result<()> {
+        let mut missing = HashMap::new();
+        let stages = Stage::all(plan).into_iter().flat_map(|stage| kernels(stage, plan));
+        for kernel in stages.chain(other_kernels(plan)) {
+            if kernel.loops <= MAX_LOOP_ITERATIONS && !self.pipelines.contains_key(&kernel.shader) {
+                missing.insert(kernel.shader.clone(), kernel);
+            }
+        }
+        let device = self.device.inner()?;
+        let missing: Vec<_> = missing.into_iter().collect();
+        let compiled =
+            missing.par_iter().map(|(shader, kernel)| (shader.clone(), Pipeline::compiled(device, kernel)));
+        let compiled: Vec<_> = compiled.collect();
+        self.pipelines.extend(compiled);
+        self.device.check()
     }
 
     /// The commands of all stages at single levels, and of joined levels that share buffers.
@@ -136,8 +154,8 @@ impl Gpu {
             let most = if shares { plan.levels.len() - stage.level().unwrap_or(0) } else { 1 };
             for levels in 1..=most {
                 let run = Run { levels, ..stage.into() };
-                let recorded = self.recorded(&run, plan, buffers, ends.then_some(&mut endings))?;
-                commands.insert(run, recorded);
+                let recorded = self.recorded(&run, &[], plan, buffers, ends.then_some(&mut endings))?;
+                commands.insert((run, Vec::new()), recorded);
             }
         }
         // `Change` zeroes the indirect workgroup counts, which must be known before it is recorded.
@@ -145,16 +163,18 @@ impl Gpu {
         Ok(commands)
     }
 
-    /// The commands of `run`.
+    /// The commands of `run`, if the messages `sent` exist at each of its levels; all if none are listed.
     fn recorded(
         &mut self,
         run: &Run,
+        sent: &[Sent],
         plan: &Plan,
         buffers: &Buffers,
         endings: Option<&mut Vec<[u32; 3]>>,
     ) -> Result<Arc<[Command]>> {
         let level = run.stage.level().unwrap_or(0);
-        self.recorded_at(level, plan, buffers, endings, |recorder| {
+        self.recorded_at(level, plan, buffers, run.work(plan), endings, |recorder| {
+            recorder.sent = sent.to_vec();
             recorder.only = run.band.as_ref().map(|band| band.rows.start as u32..band.rows.end as u32);
             match record_levels(run.stage) {
                 Some(record) if run.levels > 1 => record(recorder, level..level + run.levels),
@@ -163,12 +183,13 @@ impl Gpu {
         })
     }
 
-    /// The commands that `record` records at `level`.
+    /// The commands that `record` records at `level`, for about `work` ns on one thread of a processor.
     fn recorded_at<'a>(
         &'a mut self,
         level: usize,
         plan: &'a Plan,
         buffers: &'a Buffers,
+        work: f64,
         endings: Option<&'a mut Vec<[u32; 3]>>,
         record: impl FnOnce(&mut Recorder<'a>) -> Result<()>,
     ) -> Result<Arc<[Command]>> {
@@ -180,12 +201,13 @@ impl Gpu {
             buffers,
             level,
             only: None,
+            sent: Vec::new(),
             source: None,
             endings,
             commands: Vec::new(),
         };
         record(&mut recorder)?;
-        Ok(recorder.commands.into())
+        Ok(recorder.complete(work).into())
     }
 
     fn state(&self) -> &State {
@@ -197,16 +219,20 @@ impl Gpu {
         if self.device.software {
             memory::check(plan.bytes(), Purpose::Match)?;
         }
+        self.device.free_staging();
         let mut buffers = Buffers::new(&mut self.device, plan)?;
+        self.compile(plan)?;
         let commands = self.all_commands(plan, &mut buffers)?;
-        let upload = self.recorded_at(0, plan, &buffers, None, |recorder| record_upload(recorder))?;
+        let upload = self.recorded_at(0, plan, &buffers, 0.0, None, |recorder| record_upload(recorder))?;
         let words = buffers.levels[0].pixel_pitch as usize * plan.size().1;
-        Ok(State { plan: plan.clone(), buffers, commands, upload, words: vec![0; words] })
+        let messages = SentMessages::none(plan.levels.len());
+        Ok(State { plan: plan.clone(), buffers, commands, messages, upload, words: vec![0; words] })
     }
 
-    /// Uploads the pair and its label ranges, and resets the messages.
+    /// Uploads the pair and its label ranges.
     fn load(&mut self, state: &mut State, prepared: &Prepared) -> Result<()> {
-        let State { plan, buffers, words, upload, .. } = state;
+        let State { plan, buffers, words, upload, messages, .. } = state;
+        *messages = SentMessages::none(plan.levels.len());
         let device = &mut self.device;
         let (pair, pitch) = (&prepared.pair, buffers.levels[0].pixel_pitch);
         let array = |data: Data| buffers.rows(plan, data);
@@ -231,14 +257,10 @@ impl Gpu {
             array(Data::LabelRange(z))
                 .write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
         }
-        // With a ring of rows, rows are zeroed when they enter it.
-        let by_parts = |data: &Data| !plan.holds_all_rows() && data.level() == Some(0);
-        let encoder = self.encoder()?;
-        for data in buffers.zeroed.iter().filter(|data| !by_parts(data)) {
-            for (buffer, place) in array(*data).held() {
-                encoder.clear_buffer(buffer, place.start, Some(place.end - place.start));
-            }
+        for data in &buffers.zeroed {
+            array(*data).held().try_for_each(|(buffer, bytes)| self.clear(buffer, &bytes))?;
         }
+        let encoder = self.encoder()?;
         for z in 0..plan.levels.len() {
             for copy in array(Data::FullWindows(z)).copy_to(array(Data::Windows(z))) {
                 let ((from, at), (to, to_at)) = (&copy.from, &copy.to);
@@ -311,7 +333,7 @@ impl Backend for Gpu {
             // The maps stay; finish what was recorded for them.
             self.submit()?;
         }
-        (self.encoder, self.passes, self.work) = (None, 0, 0);
+        self.discard();
         self.device.traffic = Traffic::default();
         if !self.state.as_ref().is_some_and(|state| plan.fits(&state.plan)) {
             std::mem::swap(&mut self.state, &mut self.other);
@@ -320,7 +342,7 @@ impl Backend for Gpu {
             Some(mut state) if plan.fits(&state.plan) => {
                 if state.plan.core != plan.core {
                     state.plan = plan.clone();
-                    state.commands.retain(|run, _| run.stage != Stage::RightView);
+                    state.commands.retain(|(run, _), _| run.stage != Stage::RightView);
                 }
                 state
             }

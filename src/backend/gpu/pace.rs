@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-/// Approximate loop iterations of all invocations per submission: short enough for drivers that stop long
-/// jobs, and for progress bars with software drivers.
-const WORK: u64 = 1 << 32;
-const SOFTWARE_WORK: u64 = 1 << 30;
+/// Work per submission, as the approximate time on one thread of a processor in ns: short enough for drivers
+/// that stop long jobs, and for progress bars with software drivers.
+const WORK: u64 = 1_000_000_000;
+const SOFTWARE_WORK: u64 = 250_000_000;
 /// Initial value in browsers.
-const BROWSER_WORK: u64 = 1 << 24;
+const BROWSER_WORK: u64 = 4_000_000;
 /// Submissions that take less than this grow twofold.
 const SHORT: Duration = Duration::from_millis(30);
 /// Longer submissions shrink, because they delay progress bars, and the page itself with software drivers.
@@ -41,7 +41,7 @@ impl Pace {
         Self { work: BROWSER_WORK, grows: true, ..Self::new(false) }
     }
 
-    /// Loop iterations per submission.
+    /// Work per submission, in ns on one thread of a processor.
     pub(super) fn work(&self) -> u64 {
         self.work
     }
@@ -75,11 +75,11 @@ mod tests {
     use super::*;
 
     /// Work per submission after many submissions, if the browser polls every `look` and reports two at once,
-    /// and the device runs `per_microsecond` iterations in a microsecond.
-    fn settled(look: Duration, per_microsecond: u64) -> u64 {
+    /// and the device is `times` as fast as one thread of a processor.
+    fn settled(look: Duration, times: u64) -> u64 {
         let mut pace = Pace::in_browser();
         for _ in 0..100 {
-            let two = Duration::from_micros(2 * pace.work() / per_microsecond);
+            let two = Duration::from_nanos(2 * pace.work() / times);
             let looks = two.as_nanos().div_ceil(look.as_nanos().max(1)).max(1) as u32;
             pace.end(if look.is_zero() { two / 2 } else { looks * look });
             pace.end(if look.is_zero() { two / 2 } else { Duration::ZERO });
@@ -89,15 +89,15 @@ mod tests {
 
     #[test]
     fn work_grows_until_submissions_take_long() {
-        let slow = 400;
+        let slow = 2;
         for (look, most) in [(0, 100), (100, 400)] {
             let work = settled(Duration::from_millis(look), slow);
-            let milliseconds = work / slow / 1000;
+            let milliseconds = work / slow / 1_000_000;
             assert!((15..=most).contains(&milliseconds), "looked for every {look} ms: {milliseconds} ms");
         }
         // Rare polling does not slow down a fast device.
         for look in [0, 100] {
-            assert_eq!(settled(Duration::from_millis(look), 400_000), WORK, "{look}");
+            assert_eq!(settled(Duration::from_millis(look), 2_000), WORK, "{look}");
         }
     }
 

@@ -5,7 +5,7 @@ use super::stages::record_transposed;
 use super::words::window_words;
 use super::{Gpu, State};
 use crate::backend::probe::Probe;
-use crate::backend::{Backend, Map};
+use crate::backend::{Backend, Map, Stage};
 use crate::error::{Error, Result};
 use crate::graph::{LevelGraph, NO_MEMBER};
 use crate::image::Plane;
@@ -22,6 +22,10 @@ const LONG_COPY: Duration = Duration::from_millis(100);
 
 impl Probe for Gpu {
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
+        if self.state().messages.lacks(volume) {
+            let (rows, labels, _) = volume_shape(&self.state().plan, volume);
+            return Ok(vec![0; rows * labels]);
+        }
         let (buffer, pitch, per_word) = self.volume(volume);
         let words = block_on(self.words(&buffer))?;
         let plan = &self.state().plan;
@@ -40,6 +44,7 @@ impl Probe for Gpu {
 
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
         self.submit()?;
+        self.send(volume)?;
         let (buffer, pitch, per_word) = self.volume(volume);
         let plan = &self.state().plan;
         let height = plan.levels[volume.level()].height;
@@ -108,8 +113,9 @@ impl Probe for Gpu {
             }
         }
         state.buffers.rows(&state.plan, Data::Members(level)).write(&mut self.device, &words)?;
-        let commands = self
-            .recorded_at(level, &state.plan, &state.buffers, None, |recorder| record_transposed(recorder))?;
+        let commands = self.recorded_at(level, &state.plan, &state.buffers, 0.0, None, |recorder| {
+            record_transposed(recorder)
+        })?;
         self.state = Some(state);
         self.record(&commands)
     }
@@ -130,6 +136,8 @@ impl Probe for Gpu {
 
     fn poison(&mut self, byte: u8) -> Result<()> {
         self.submit()?;
+        let State { plan, messages, .. } = self.state.as_mut().expect("a match to poison");
+        Stage::all(plan).into_iter().for_each(|stage| messages.send(stage));
         let all = self.state().buffers.written().to_vec();
         for buffer in all {
             self.device.write(&buffer, &vec![byte; buffer.size() as usize])?;
@@ -139,6 +147,22 @@ impl Probe for Gpu {
 }
 
 impl Gpu {
+    /// Counts the messages of `volume` as sent; those between the same two levels are 0 unless they were sent.
+    fn send(&mut self, volume: Volume) -> Result<()> {
+        let State { plan, buffers, messages, .. } = self.state.as_mut().expect("a match to write to");
+        if let (true, Volume::Up(z)) | (true, Volume::Down(z)) = (messages.lacks(volume), volume) {
+            let coarser = z + usize::from(volume == Volume::Down(z));
+            for volume in [Volume::Up(coarser), Volume::Down(coarser - 1)] {
+                let rows = buffers.volume(plan, volume);
+                let words =
+                    vec![0; Data::Volume(volume).array(plan).words * plan.levels[volume.level()].height];
+                rows.write(&mut self.device, &words)?;
+            }
+        }
+        messages.add(volume);
+        Ok(())
+    }
+
     /// The rate at which the device copies between two large buffers: bytes read and written per second.
     ///
     /// # Errors

@@ -1,89 +1,114 @@
 //! The queue of the device: records commands of stages, submits them, and requests results.
 
-use super::commands::{Command, Groups};
+use super::commands::{Command, Dispatch, Groups};
 use super::rows::Rows;
 use super::timer::{PASSES_PER_SUBMIT, Timer};
 use super::{Gpu, device};
 use crate::error::Result;
 use std::ops::Range;
 
+/// Commands that are recorded, but not submitted yet.
+#[derive(Default)]
+pub(super) struct Recording {
+    encoder: Option<wgpu::CommandEncoder>,
+    /// Takes all dispatches until a command of another kind, because each pass costs time of the host.
+    pass: Option<wgpu::ComputePass<'static>>,
+    /// Passes so far, and the work of their dispatches.
+    passes: usize,
+    work: u64,
+}
+
 impl Gpu {
+    /// The encoder, for commands that belong to no pass.
     pub(super) fn encoder(&mut self) -> Result<&mut wgpu::CommandEncoder> {
-        if self.encoder.is_none() {
+        let Recording { encoder, pass, .. } = &mut self.recording;
+        *pass = None;
+        if encoder.is_none() {
             let descriptor = wgpu::CommandEncoderDescriptor::default();
-            self.encoder = Some(self.device.inner()?.create_command_encoder(&descriptor));
+            *encoder = Some(self.device.inner()?.create_command_encoder(&descriptor));
         }
-        Ok(self.encoder.as_mut().expect("just made"))
+        Ok(encoder.as_mut().expect("just made"))
+    }
+
+    /// The open pass.
+    fn pass(&mut self) -> Result<&mut wgpu::ComputePass<'static>> {
+        if self.recording.pass.is_none() {
+            if self.timer.is_some() && self.recording.passes >= PASSES_PER_SUBMIT {
+                self.submit()?;
+            }
+            let mut timer = self.timer.take();
+            let timestamp_writes = timer.as_mut().and_then(Timer::pass);
+            let descriptor = wgpu::ComputePassDescriptor { label: None, timestamp_writes };
+            let pass =
+                self.encoder().map(|encoder| encoder.begin_compute_pass(&descriptor).forget_lifetime());
+            self.timer = timer;
+            self.recording.pass = Some(pass?);
+            self.recording.passes += 1;
+            self.device.traffic.passes += 1;
+        }
+        Ok(self.recording.pass.as_mut().expect("just begun"))
     }
 
     /// Records commands, and submits them when there is enough work.
     pub(super) fn record(&mut self, commands: &[Command]) -> Result<()> {
-        let mut rest = commands;
-        while let Some(first) = rest.first() {
-            let mut recorded = 1;
-            match first {
+        for command in commands {
+            match command {
                 Command::Copy(copy) => {
                     let (from, to) = (&copy.from, &copy.to);
                     self.encoder()?.copy_buffer_to_buffer(&from.0, from.1, &to.0, to.1, copy.bytes);
                 }
-                Command::Clear(buffer, bytes) => {
-                    let size = bytes.end - bytes.start;
-                    self.encoder()?.clear_buffer(buffer, bytes.start, Some(size));
-                }
-                Command::Dispatch(_) => {
-                    let mut timer = self.timer.take();
-                    let writes = timer.as_mut().and_then(Timer::pass);
-                    let (mut work, most) = (self.work, self.device.pace.work());
-                    let groups = self.state.as_ref().map(|state| state.buffers.groups.clone());
-                    {
-                        let mut pass = self.encoder()?.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                            label: None,
-                            timestamp_writes: writes,
-                        });
-                        recorded = 0;
-                        while let Some(Command::Dispatch(dispatch)) = rest.get(recorded) {
-                            pass.set_pipeline(&dispatch.pipeline);
-                            pass.set_bind_group(0, &dispatch.bind_group, &[]);
-                            match &dispatch.groups {
-                                Groups::Fixed(x, y) => pass.dispatch_workgroups(*x, *y, 1),
-                                Groups::UntilSettled(at) => {
-                                    let groups = groups.as_ref().expect("a stage has a state to run on");
-                                    pass.dispatch_workgroups_indirect(groups, 12 * *at as u64);
-                                }
-                            }
-                            work += dispatch.work;
-                            recorded += 1;
-                            if work >= most {
-                                break;
-                            }
-                        }
-                    }
-                    self.timer = timer;
-                    self.work = work;
-                    self.passes += 1;
-                    self.device.traffic.dispatches += recorded as u64;
-                }
+                Command::Clear(buffer, bytes) => self.clear(buffer, bytes)?,
+                Command::Dispatch(dispatch) => self.dispatch(dispatch)?,
             }
-            rest = &rest[recorded..];
-            let timed = self.timer.is_some() && self.passes >= PASSES_PER_SUBMIT;
-            if timed || self.work >= self.device.pace.work() {
-                self.submit()?;
-            }
+        }
+        if self.timer.is_some() {
+            // Each run has passes of its own.
+            self.recording.pass = None;
         }
         Ok(())
     }
 
+    /// Records zeros for a range of bytes.
+    pub(super) fn clear(&mut self, buffer: &wgpu::Buffer, bytes: &Range<u64>) -> Result<()> {
+        let size = bytes.end - bytes.start;
+        self.encoder()?.clear_buffer(buffer, bytes.start, Some(size));
+        self.device.traffic.bytes_cleared += size;
+        Ok(())
+    }
+
+    fn dispatch(&mut self, dispatch: &Dispatch) -> Result<()> {
+        let groups = self.state.as_ref().map(|state| state.buffers.groups.clone());
+        let pass = self.pass()?;
+        pass.set_pipeline(&dispatch.pipeline);
+        pass.set_bind_group(0, &dispatch.bind_group, &[]);
+        match &dispatch.groups {
+            Groups::Fixed(x, y) => pass.dispatch_workgroups(*x, *y, 1),
+            Groups::UntilSettled(at) => {
+                let groups = groups.as_ref().expect("a stage has a state to run on");
+                pass.dispatch_workgroups_indirect(groups, 12 * *at as u64);
+            }
+        }
+        self.device.traffic.dispatches += 1;
+        self.recording.work += dispatch.work;
+        if self.recording.work >= self.device.pace.work() { self.submit() } else { Ok(()) }
+    }
+
     /// Submits all recorded commands.
     pub(super) fn submit(&mut self) -> Result<()> {
-        let is_full = self.work >= self.device.pace.work();
-        (self.passes, self.work) = (0, 0);
-        if let Some(mut encoder) = self.encoder.take() {
+        let Recording { encoder, pass, work, .. } = std::mem::take(&mut self.recording);
+        drop(pass);
+        if let Some(mut encoder) = encoder {
             if let Some(timer) = &mut self.timer {
-                timer.submit(&self.device, &mut encoder)?;
+                timer.submit(&mut self.device, &mut encoder)?;
             }
-            self.device.submit(encoder, is_full)?;
+            self.device.submit(encoder, work >= self.device.pace.work())?;
         }
         self.device.check()
+    }
+
+    /// Forgets what was recorded.
+    pub(super) fn discard(&mut self) {
+        self.recording = Recording::default();
     }
 
     /// Requests ranges of bytes after all commands recorded so far.
@@ -91,8 +116,7 @@ impl Gpu {
         let mut staged = Vec::new();
         for (buffer, bytes) in ranges {
             let size = bytes.end - bytes.start;
-            let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-            let staging = self.device.buffer("staging", size, usage)?;
+            let staging = self.device.staging(size)?;
             self.encoder()?.copy_buffer_to_buffer(buffer, bytes.start, &staging, 0, size);
             staged.push(staging);
         }

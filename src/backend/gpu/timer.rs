@@ -86,11 +86,10 @@ impl Timer {
     }
 
     /// Saves the timestamps of the passes in `encoder`, which is about to be submitted.
-    pub(super) fn submit(&mut self, device: &Device, encoder: &mut wgpu::CommandEncoder) -> Result<()> {
+    pub(super) fn submit(&mut self, device: &mut Device, encoder: &mut wgpu::CommandEncoder) -> Result<()> {
         let Some(clock) = self.clock.as_mut().filter(|c| !c.passes.is_empty()) else { return Ok(()) };
         let passes = std::mem::take(&mut clock.passes);
-        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        let log = device.buffer("times", 8 * TICKS, usage)?;
+        let log = device.staging(8 * TICKS)?;
         encoder.resolve_query_set(&clock.queries, 0..2 * passes.len() as u32, &clock.resolved, 0);
         encoder.copy_buffer_to_buffer(&clock.resolved, 0, &log, 0, 16 * passes.len() as u64);
         clock.logs.push((passes, log));

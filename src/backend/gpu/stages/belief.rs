@@ -7,7 +7,8 @@ use crate::backend::gpu::kernel::{Variant, shader};
 use crate::backend::gpu::rows::HALO;
 use crate::backend::gpu::uniform::LevelParams;
 use crate::error::Result;
-use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan};
+use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK};
+use crate::program::Sent;
 use crate::stage::{Data, Volume};
 use std::ops::Range;
 
@@ -15,7 +16,7 @@ use std::ops::Range;
 const QUADS: u32 = LABEL_BLOCK as u32 / 4;
 
 shader! {
-    "belief"(plan, level) { most: u32, has_down: u32, has_up: u32 }
+    "belief"(plan, level) { most: u32, sent: u32, has_down: u32, has_up: u32 }
     main {
         evidence, dependency around HALO, members around HALO, incoming, down, up, belief, windows
     } => {
@@ -32,24 +33,26 @@ shader! {
 }
 
 impl Uniform {
-    fn of(plan: &Plan, level: usize) -> Self {
-        let (has_down, has_up) = (level + 1 < plan.levels.len(), level > 0);
-        Self { most: plan.belief_most().into(), has_down: has_down.into(), has_up: has_up.into() }
+    fn of(r: &Recorder, level: usize) -> Self {
+        let Sent { dependency, above, below } = r.sent(level);
+        let most = r.plan.belief_most().into();
+        Self { most, sent: dependency.into(), has_down: above.into(), has_up: below.into() }
     }
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (z, threads) = (r.level, threads(&r.params()));
-    r.rows(&main(r.plan, z), &Uniform::of(r.plan, z), threads)?;
+    r.rows(&main(r.plan, z), &Uniform::of(r, z), threads)?;
     r.renew(Data::Volume(Volume::Belief(z)));
     Ok(())
 }
 
 /// Like `record`, in one dispatch for all `levels`.
 pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
-    let (plan, buffers) = (r.plan, r.buffers);
-    let own = |z: usize| (Uniform::of(plan, z), threads(&buffers.levels[z]));
-    r.levels(&main(plan, levels.start), levels, own)
+    let own: Vec<_> =
+        levels.clone().map(|z| (Uniform::of(r, z), threads(&r.buffers.levels[z]))).collect();
+    let first = levels.start;
+    r.levels(&main(r.plan, first), levels, |z| own[z - first])
 }
 
 fn threads(level: &LevelParams) -> u32 {

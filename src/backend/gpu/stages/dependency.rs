@@ -8,12 +8,12 @@ use crate::backend::gpu::kernel::{Variant, shader};
 use crate::backend::gpu::rows::HALO;
 use crate::error::Result;
 use crate::graph::NO_MEMBER;
-use crate::plan::{GRAPH_WINDOW, Plan, TruncationRule};
+use crate::plan::{GRAPH_WINDOW, TruncationRule};
 use crate::stage::{Data, Volume};
 use std::ops::Range;
 
 shader! {
-    "dependency"(plan, level) { tau: u32, step: u32 }
+    "dependency"(plan, level) { tau: u32, step: u32, sent: u32 }
     main { members, belief around HALO, dependency, windows } => {
         let absolute = plan.dependency.rule == TruncationRule::Absolute;
         // The finest level has the most labels.
@@ -32,22 +32,23 @@ shader! {
 }
 
 /// The uniform of `level`. A step that costs as much as any disagreement has no effect.
-fn uniform(plan: &Plan, level: usize) -> Uniform {
-    let tau = plan.dependency.tau;
-    Uniform { tau: tau.into(), step: plan.label_step(level).unwrap_or(tau).into() }
+fn uniform(r: &Recorder, level: usize) -> Uniform {
+    let tau = r.plan.dependency.tau;
+    let step = r.plan.label_step(level).unwrap_or(tau);
+    Uniform { tau: tau.into(), step: step.into(), sent: r.sent(level).dependency.into() }
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (plan, z, width) = (r.plan, r.level, r.params().width);
-    r.rows(&main(plan, z), &uniform(plan, z), width)?;
+    r.rows(&main(plan, z), &uniform(r, z), width)?;
     r.renew(Data::Volume(Volume::Dependency(z)));
     Ok(())
 }
 
 /// Like `record`, in one dispatch for all `levels`.
 pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
-    let (plan, buffers) = (r.plan, r.buffers);
-    let own = |z: usize| (uniform(plan, z), buffers.levels[z].width);
+    let own: Vec<_> = levels.clone().map(|z| (uniform(r, z), r.buffers.levels[z].width)).collect();
+    let first = levels.start;
     // The coarsest level has a step if any other one has.
-    r.levels(&main(plan, levels.end - 1), levels, own)
+    r.levels(&main(r.plan, levels.end - 1), levels, |z| own[z - first])
 }

@@ -28,12 +28,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         cap: scale.cap.into(),
     };
     if r.level == 0 && !r.plan.holds_all_rows() {
-        // These rows replace others, whose messages are discarded.
         cost::record_costs(r)?;
-        r.clear(Data::Volume(Volume::Dependency(0)));
-        if Volume::Down(0).is_there(r.plan.levels.len()) {
-            r.clear(Data::Volume(Volume::Down(0)));
-        }
     }
     r.rows(&main(r.plan, r.level), &own, r.params().width)?;
     r.renew(Data::Volume(Volume::Belief(r.level)));

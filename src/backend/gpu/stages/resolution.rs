@@ -11,7 +11,7 @@ use crate::plan::TruncationRule;
 use std::ops::Range;
 
 shader! {
-    "resolution"(plan, level) { fine: LevelParams, label_offset: i32, tau: u32, fine_at: u32 }
+    "resolution"(plan, level) { fine: LevelParams, label_offset: i32, tau: u32, fine_at: u32, sent: u32 }
     main { fine_belief, belief, fine_down, up, windows, fine_windows } => {
         // The finest levels have the most labels.
         let (coarse, fine) = (plan.levels[1].stride, plan.levels[0].stride);
@@ -30,6 +30,7 @@ impl Uniform {
             label_offset: r.plan.label_offset(level),
             tau: r.plan.resolution.tau.into(),
             fine_at: 0,
+            sent: r.sent(level).below.into(),
         }
     }
 }
