@@ -45,7 +45,9 @@ pub fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(Pair, C
     }
     watch.host("conditioning", || {
         let (conditioned, found) = conditioning::condition(&pair, plan.range, &plan.method.front);
-        let Some(full) = pair.full() else { return Ok((conditioned, found)) };
+        let Some(full) = pair.full().filter(|_| found != Conditioning::default()) else {
+            return Ok((conditioned, found));
+        };
         let found = found.doubled();
         Ok((conditioned.with_full(Some(found.apply(full))), found))
     })

@@ -75,7 +75,8 @@ impl Pair {
     pub fn halved(&self) -> Self {
         let (width, height) = self.size();
         let full = if width % 2 + height % 2 == 0 { self.clone() } else { self.map(Image::in_blocks) };
-        full.map(Image::halved).with_full(Some(full))
+        let half = full.map(Image::halved);
+        Self { full: Some(Box::new(full)), is_exact_half: true, ..half }
     }
 }
 

@@ -367,6 +367,8 @@ pub struct Pair {
     orientations: [Orientation; 2],
     doubts: [Option<String>; 2],
     full: Option<Box<Pair>>,
+    /// Whether each pixel is the mean of a block of `full`, unchanged since [`Self::halved`].
+    is_exact_half: bool,
     /// (width, height) of each image, without the masked extension to the size of the larger one.
     own_sizes: [(usize, usize); 2],
 }
@@ -400,6 +402,7 @@ impl Pair {
             orientations: [Orientation::UPRIGHT; 2],
             doubts: [None, None],
             full: None,
+            is_exact_half: false,
         }
     }
 
@@ -449,6 +452,7 @@ impl Pair {
 
     /// Both views, mutable; shared images are copied.
     pub(crate) fn views_mut(&mut self) -> [&mut Image; 2] {
+        self.is_exact_half = false;
         [Arc::make_mut(&mut self.left), Arc::make_mut(&mut self.right)]
     }
 
@@ -463,7 +467,8 @@ impl Pair {
     #[must_use]
     pub fn mirrored(&self) -> Self {
         let full = self.full.as_ref().map(|full| Box::new(full.mirrored()));
-        Self { full, ..Self::without_georeference(self.right.mirrored(), self.left.mirrored()) }
+        let mirrored = Self::without_georeference(self.right.mirrored(), self.left.mirrored());
+        Self { full, is_exact_half: self.is_exact_half, ..mirrored }
     }
 
     /// Applies `f` to each view; the results must have the same size.
@@ -480,17 +485,22 @@ impl Pair {
 
     /// The same pair, as half the size of `full`.
     pub(crate) fn with_full(self, full: Option<Self>) -> Self {
-        Self { full: full.map(Box::new), ..self }
+        Self { full: full.map(Box::new), is_exact_half: false, ..self }
+    }
+
+    /// Whether each pixel is the mean of a block of the [full](Self::full) pair.
+    pub(crate) fn is_exact_half(&self) -> bool {
+        self.is_exact_half
     }
 
     /// The same pair with another left view of the same size.
     pub(crate) fn with_left(&self, left: Image) -> Self {
-        Self { left: Arc::new(left), ..self.clone() }
+        Self { left: Arc::new(left), is_exact_half: false, ..self.clone() }
     }
 
     /// The same pair with another right view of the same size.
     pub(crate) fn with_right(&self, right: Image) -> Self {
-        Self { right: Arc::new(right), ..self.clone() }
+        Self { right: Arc::new(right), is_exact_half: false, ..self.clone() }
     }
 
     /// Both views inside `part`.
@@ -502,7 +512,7 @@ impl Pair {
         let georeferences = self.georeferences.each_ref().map(|georeference| {
             georeference.as_ref().map(|georeference| georeference.moved(part.x.start, part.y.start))
         });
-        Self { georeferences, full, ..self.map(|view| view.crop(part)) }
+        Self { georeferences, full, is_exact_half: self.is_exact_half, ..self.map(|view| view.crop(part)) }
     }
 
     /// (width, height) of the left and the right image, which differ only in a [pair of raw images](Pair::of_raw_frames).

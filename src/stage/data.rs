@@ -89,6 +89,10 @@ pub enum Data {
     MedianWeights,
     /// Spatial weights of the median of filled pixels.
     FillWeights,
+    /// The left view at full size, as uploaded in whole 8-bit levels: one word per pixel.
+    FullLeftWords,
+    /// The right view at full size, as uploaded.
+    FullRightWords,
     /// The left view at full size, if the pair is matched at half its size.
     FullLeft,
     /// The right view at full size.
@@ -317,6 +321,12 @@ impl Data {
             Self::FillWeights => constant("fill_weights"),
             Self::FullLeft => full("full_left", 2).starting(Given),
             Self::FullRight => full("full_right", 2).starting(Given),
+            Self::FullLeftWords => {
+                full("full_left_words", 1).starting(Given).place(Place::In(Self::FullLeftCensus))
+            }
+            Self::FullRightWords => {
+                full("full_right_words", 1).starting(Given).place(Place::In(Self::FullRightCensus))
+            }
             Self::FullLeftCensus => full("full_left_census", 1),
             Self::FullRightCensus => full("full_right_census", 1),
             Self::BlockCosts => fine("block_costs", 4),
@@ -426,6 +436,8 @@ impl Data {
             Self::FullRight,
             Self::FullLeftCensus,
             Self::FullRightCensus,
+            Self::FullLeftWords,
+            Self::FullRightWords,
             Self::BlockCosts,
         ];
         maps.chain(others).collect()
@@ -457,8 +469,11 @@ impl Data {
             Self::Volume(volume) => volume.is_there(levels),
             Self::NextGuide(z) | Self::Candidates(z) => (1..levels).contains(&z),
             Self::LabelRange(z) => z < levels && plan.limits_labels(),
+            Self::LeftWords | Self::RightWords => plan.full.is_none(),
             Self::FullLeft
             | Self::FullRight
+            | Self::FullLeftWords
+            | Self::FullRightWords
             | Self::FullLeftCensus
             | Self::FullRightCensus
             | Self::BlockCosts

@@ -278,11 +278,15 @@ impl Device {
         }
     }
 
+    /// Learns of what has happened so far. A lost device reports it here; otherwise the next buffers would seem invalid.
+    pub(super) fn look(&self) -> Result<()> {
+        self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
+        self.check()
+    }
+
     /// Requests buffers in their state after all submissions so far.
     pub(super) fn request(&mut self, buffers: Vec<wgpu::Buffer>) -> Result<Requested> {
-        // A lost device reports it here; later, the buffers would seem invalid.
-        self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
-        self.check()?;
+        self.look()?;
         let mut requested = Requested { buffers: Vec::new(), submitted: self.submitted };
         for buffer in buffers {
             self.traffic.bytes_down += buffer.size();

@@ -30,7 +30,11 @@ impl Gpu {
         let of_run = (run.clone(), sent(&state, run));
         let commands = match state.commands.get(&of_run) {
             Some(commands) => Ok(Arc::clone(commands)),
-            None => self.recorded(run, &of_run.1, &state.plan, &state.buffers, None),
+            None => {
+                let recorded =
+                    |gpu: &mut Self| gpu.recorded(run, &of_run.1, &state.plan, &state.buffers, None);
+                self.device.look().and_then(|()| recorded(self))
+            }
         };
         if let Ok(commands) = &commands {
             run.stages().for_each(|stage| state.messages.send(stage));

@@ -223,8 +223,10 @@ impl Gpu {
         let mut buffers = Buffers::new(&mut self.device, plan)?;
         self.compile(plan)?;
         let commands = self.all_commands(plan, &mut buffers)?;
-        let upload = self.recorded_at(0, plan, &buffers, 0.0, None, |recorder| record_upload(recorder))?;
-        let words = buffers.levels[0].pixel_pitch as usize * plan.size().1;
+        let upload =
+            self.recorded_at(0, plan, &buffers, 0.0, None, |recorder| record_upload(recorder, false))?;
+        let (pitch, rows) = uploaded_rows(plan, &buffers);
+        let words = pitch as usize * rows;
         let messages = SentMessages::none(plan.levels.len());
         Ok(State { plan: plan.clone(), buffers, commands, messages, upload, words: vec![0; words] })
     }
@@ -236,20 +238,22 @@ impl Gpu {
         let device = &mut self.device;
         let (pair, pitch) = (&prepared.pair, buffers.levels[0].pixel_pitch);
         let array = |data: Data| buffers.rows(plan, data);
-        let mut narrow = true;
-        for (image, on_its_way) in [(pair.left(), Data::LeftWords), (pair.right(), Data::RightWords)] {
-            narrow = narrow && narrow_words(image, pitch, words);
+        let larger = pair.full().filter(|_| plan.full.is_some());
+        let uploaded = larger.unwrap_or(pair);
+        let mut narrow = larger.is_none() || pair.is_exact_half();
+        for (image, data) in [uploaded.left(), uploaded.right()].into_iter().zip(uploaded_words(plan)) {
+            narrow = narrow && narrow_words(image, uploaded_rows(plan, buffers).0, words);
             if narrow {
-                array(on_its_way).write(device, words)?;
+                array(data).write(device, words)?;
             }
         }
         if !narrow {
             array(Data::LEFT).write(device, &image_words(pair.left(), pitch))?;
             array(Data::Right).write(device, &image_words(pair.right(), pitch))?;
-        }
-        if let Some(larger) = pair.full().filter(|_| plan.full.is_some()) {
-            array(Data::FullLeft).write(device, &full_words(larger.left(), full_pitch(plan)))?;
-            array(Data::FullRight).write(device, &full_words(larger.right(), full_pitch(plan)))?;
+            if let Some(larger) = larger {
+                array(Data::FullLeft).write(device, &full_words(larger.left(), full_pitch(plan)))?;
+                array(Data::FullRight).write(device, &full_words(larger.right(), full_pitch(plan)))?;
+            }
         }
         for (z, l) in plan.levels.iter().enumerate().filter(|_| plan.limits_labels()) {
             let words = |ranges: &Plane<_>| label_range_words(ranges, &buffers.levels[z]);
@@ -297,6 +301,21 @@ impl Gpu {
         let array = Data::Map(map).array(plan);
         (width, height, array.words / map.words())
     }
+}
+
+/// The words of both views as uploaded.
+fn uploaded_words(plan: &Plan) -> [Data; 2] {
+    if plan.full.is_some() {
+        [Data::FullLeftWords, Data::FullRightWords]
+    } else {
+        [Data::LeftWords, Data::RightWords]
+    }
+}
+
+/// Words per row of an uploaded view, and its number of rows.
+fn uploaded_rows(plan: &Plan, buffers: &Buffers) -> (u32, usize) {
+    let height = plan.size().1;
+    if plan.full.is_some() { (full_pitch(plan), 2 * height) } else { (buffers.levels[0].pixel_pitch, height) }
 }
 
 /// Converts the words of a map, of the shape (width, height, words per row), with `value`.

@@ -1,16 +1,22 @@
-//! Unpacks uploaded images: those in whole 8-bit levels are uploaded as one word per pixel.
+//! Unpacks uploaded images: those in whole 8-bit levels are uploaded as one word per pixel. Pairs that are
+//! matched at half their size are halved here.
 
 use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
+use crate::backend::gpu::uniform::full_pitch;
 use crate::error::Result;
 
 shader! {
-    "upload"(plan, level) {}
-    main { left_words, right_words, left, right } => Variant::new(0);
+    "upload"(plan, level) { full_pitch: u32, is_opaque: u32 }
+    unpack { left_words, right_words, left, right } if plan.full.is_none() => Variant::new(0);
+    halve { full_left_words, full_right_words, full_left, full_right, left, right } if plan.full.is_some() => {
+        Variant::new(2 * 4)
+    };
 }
 
-/// Unpacks the words of the pair.
-pub(super) fn record(r: &mut Recorder) -> Result<()> {
-    let width = r.params().width;
-    r.rows(&main(r.plan, 0), &Uniform {}, width)
+/// Unpacks the words of the pair. If `is_opaque`, their highest byte counts for nothing; otherwise it masks pixels.
+pub(super) fn record(r: &mut Recorder, is_opaque: bool) -> Result<()> {
+    let (plan, width) = (r.plan, r.params().width);
+    let own = Uniform { full_pitch: full_pitch(plan), is_opaque: is_opaque.into() };
+    r.rows(&if plan.full.is_some() { halve(plan, 0) } else { unpack(plan, 0) }, &own, width)
 }
