@@ -10,6 +10,8 @@ struct Params {
     full_pitch: u32,
     // Whether the highest byte of a word counts for nothing.
     is_opaque: u32,
+    // Whether the lowest byte of a word is blue, not red.
+    is_bgra: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -24,9 +26,16 @@ struct Params {
 @group(0) @binding(7) var<storage, read_write> full_left: array<vec2<u32>>;
 @group(0) @binding(8) var<storage, read_write> full_right: array<vec2<u32>>;
 
+// red | green << 8 | blue << 16, | the highest byte.
+fn ordered(word: u32) -> u32 {
+    let exchanged = (word & 0xff00ff00u) | ((word & 0xffu) << 16u) | ((word >> 16u) & 0xffu);
+    return select(word, exchanged, params.is_bgra != 0u);
+}
+
 // Colour and grey in 16 bits.
 fn colours(word: u32) -> vec4<u32> {
-    let colour = ((vec3(word) >> vec3(0u, 8u, 16u)) & vec3(0xffu)) << vec3(8u);
+    let bytes = ordered(word);
+    let colour = ((vec3(bytes) >> vec3(0u, 8u, 16u)) & vec3(0xffu)) << vec3(8u);
     return vec4(colour, (dot(colour, vec3(299u, 587u, 114u)) + 500u) / 1000u);
 }
 
@@ -52,7 +61,7 @@ fn unpack(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
 
 // The pixel at full size for a word.
 fn full_pixel(word: u32) -> vec2<u32> {
-    return vec2((word & 0xffffffu) | (u32(is_masked(word)) << 24u), colours(word).a);
+    return vec2((ordered(word) & 0xffffffu) | (u32(is_masked(word)) << 24u), colours(word).a);
 }
 
 // Adds the colours of an unmasked pixel to `sum`, and 1 to `count`.

@@ -81,6 +81,7 @@
 //! - [`region`] matches a region of the left view alone.
 //! - [`steady`] smooths the maps of a video over time where the scene is static.
 //! - [`depth`] turns disparities into depths and points, for calibrated cameras.
+//! - [`on_device`] matches frames that are on a GPU already, and leaves the maps there.
 //! - [`evaluation`] compares maps with ground truth.
 //! - [`image`] reads and writes images and maps.
 //! - [`threads`] has the default number of threads, and limits the threads outside matchers.
@@ -148,6 +149,7 @@ pub use front::drift;
 pub use image::Pair;
 #[cfg(not(target_arch = "wasm32"))]
 pub use matcher::SharedMatcher;
+pub use matcher::on_device;
 pub use matcher::{Answer, AutoRange, Builder, Job, Matched, Matcher, Search, Timing};
 pub use options::Method;
 pub use watch::Progress;

@@ -3,6 +3,7 @@
 mod check;
 mod job;
 mod matched;
+pub mod on_device;
 mod search;
 mod sequence;
 #[cfg(not(target_arch = "wasm32"))]

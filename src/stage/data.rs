@@ -241,7 +241,8 @@ impl Data {
     #[must_use]
     #[rustfmt::skip]
     pub fn array(self, plan: &Plan) -> Array {
-        use Start::{Constant, Given, Zero};
+        use Start::{Anything, Constant, Given, Zero};
+        let settles = plan.settled_change().is_some();
         let votes = || Votes::of(plan);
         let width = plan.levels[0].width;
         let rows = |name, words, extent: Extent| Array::new(name, words, extent, extent.rows(plan));
@@ -290,7 +291,7 @@ impl Data {
             Self::LeftCensus => fine("left_census", 2),
             Self::RightCensus => fine("right_census", 2),
             Self::Contrast => fine("contrast", 1),
-            Self::LabelMap => fine("label_map", 1).starting(Zero),
+            Self::LabelMap => fine("label_map", 1).starting(if settles { Zero } else { Anything }),
             Self::Squares => fine("squares", 1),
             Self::RowSums => Array::table("row_sums", 2 * height),
             Self::Convergence => Array::table("convergence", 6).starting(Zero),

@@ -60,7 +60,8 @@ pub(super) struct Device {
     pub(super) tick: Option<f64>,
     /// Limit of the work per submission.
     pub(super) pace: Pace,
-    patience: Duration,
+    /// Time limit of a submission, if it is not the usual one.
+    patience: Option<Duration>,
     lost_after: Option<usize>,
     under_way: VecDeque<Submission>,
     /// End of the last finished submission, as observed.
@@ -116,10 +117,7 @@ impl Device {
                 }
             }
         };
-        // A browser may hide the name.
-        let api = api(info.backend);
-        let name = if info.name.is_empty() { api.into() } else { format!("{} ({api})", info.name) };
-        let (uncaptured, device_name) = (note(&failure), name.clone());
+        let (uncaptured, device_name) = (note(&failure), name_of(&info));
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
             uncaptured(match e {
                 wgpu::Error::OutOfMemory { .. } => {
@@ -128,32 +126,48 @@ impl Device {
                 e => failed(&device_name, &e),
             });
         }));
-        let (lost, device_name) = (note(&failure), name.clone());
+        let (lost, device_name) = (note(&failure), name_of(&info));
         device.set_device_lost_callback(move |reason, message| {
             // Dropping the device also calls this, when it no longer matters.
             lost(failed(&device_name, &format!("the device was lost ({reason:?}) {message}")));
         });
-        let software = info.device_type == wgpu::DeviceType::Cpu;
         Ok(Self {
+            tick: (!features.is_empty()).then(|| queue.get_timestamp_period().into()),
+            patience: faults.patience,
+            lost_after: faults.lost_after,
+            memory: faults.memory,
+            failure,
+            ..Self::of(&info, limits, device, queue)
+        })
+    }
+
+    /// A device that a caller has opened, with the handlers that the caller has set.
+    pub(super) fn of_caller(info: &wgpu::AdapterInfo, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        Self::of(info, device.limits(), device, queue)
+    }
+
+    fn of(info: &wgpu::AdapterInfo, limits: wgpu::Limits, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let software = info.device_type == wgpu::DeviceType::Cpu;
+        Self {
+            name: name_of(info),
+            driver: driver(info),
             software,
             max_binding: limits.max_storage_buffer_binding_size,
             max_buffer: limits.max_buffer_size,
             max_groups: limits.max_compute_workgroups_per_dimension,
-            memory: faults.memory,
-            tick: (!features.is_empty()).then(|| queue.get_timestamp_period().into()),
+            memory: None,
+            tick: None,
             pace: if cfg!(target_arch = "wasm32") { Pace::in_browser() } else { Pace::new(software) },
-            patience: faults.patience.unwrap_or(if software { SOFTWARE_PATIENCE } else { PATIENCE }),
-            lost_after: faults.lost_after,
+            patience: None,
+            lost_after: None,
             under_way: VecDeque::new(),
             last_end: Instant::now(),
             submitted: 0,
-            failure,
+            failure: Arc::default(),
             staging: Vec::new(),
             traffic: Traffic::default(),
             open: Some((device, queue)),
-            driver: driver(&info),
-            name,
-        })
+        }
     }
 
     pub(super) fn inner(&self) -> Result<&wgpu::Device> {
@@ -261,7 +275,7 @@ impl Device {
             }
             return self.check();
         }
-        let waiting = wgpu::PollType::Wait { submission_index: Some(index), timeout: Some(self.patience) };
+        let waiting = wgpu::PollType::Wait { submission_index: Some(index), timeout: Some(self.patience()) };
         match self.inner()?.poll(waiting) {
             Err(wgpu::PollError::Timeout) => {
                 // Closing a device waits for its work, and this device's work never ends.
@@ -347,8 +361,12 @@ impl Device {
         self.check().err().unwrap_or_else(|| failed(&self.name, reason))
     }
 
+    fn patience(&self) -> Duration {
+        self.patience.unwrap_or(if self.software { SOFTWARE_PATIENCE } else { PATIENCE })
+    }
+
     fn hung(&self) -> Error {
-        failed(&self.name, &format!("it did not finish its work within {:?}: it hangs", self.patience))
+        failed(&self.name, &format!("it did not finish its work within {:?}: it hangs", self.patience()))
     }
 
     /// Destroys the device once it has run as many stages as its fault injection allows.
@@ -378,6 +396,12 @@ pub(super) struct Requested {
     buffers: Vec<(wgpu::Buffer, oneshot::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>)>,
     /// Number of submissions after which they are complete.
     submitted: u64,
+}
+
+/// The name of a device and its interface; a browser may hide the former.
+fn name_of(info: &wgpu::AdapterInfo) -> String {
+    let api = api(info.backend);
+    if info.name.is_empty() { api.into() } else { format!("{} ({api})", info.name) }
 }
 
 /// The failure of the device called `name`, in one line.

@@ -3,7 +3,7 @@
 use super::device::Device;
 use super::stages::Unpacking;
 use super::{Gpu, State, uploaded_rows, uploaded_words};
-use crate::backend::{Backend, Map};
+use crate::backend::Map;
 use crate::error::{Error, Result};
 use crate::plan::Plan;
 use crate::stage::Data;
@@ -43,12 +43,16 @@ impl Frame {
         use wgpu::TextureFormat::{Bgra8Unorm, Bgra8UnormSrgb, Rgba8Uint, Rgba8Unorm, Rgba8UnormSrgb};
         match self {
             Self::Texture(texture) => {
-                let (format, size) = (texture.format(), (texture.width() as usize, texture.height() as usize));
+                let (format, size) =
+                    (texture.format(), (texture.width() as usize, texture.height() as usize));
                 if !matches!(format, Bgra8Unorm | Bgra8UnormSrgb | Rgba8Uint | Rgba8Unorm | Rgba8UnormSrgb) {
                     return Err(format!("a texture in {format:?}; give RGBA or BGRA in 8 bits"));
                 }
                 if size != (width, height) {
-                    return Err(format!("a texture of {} x {} pixels, not {width} x {height}", size.0, size.1));
+                    return Err(format!(
+                        "a texture of {} x {} pixels, not {width} x {height}",
+                        size.0, size.1
+                    ));
                 }
                 if !texture.usage().contains(wgpu::TextureUsages::COPY_SRC) {
                     return Err("a texture without the usage COPY_SRC".into());
@@ -56,12 +60,19 @@ impl Frame {
             }
             Self::Buffer { buffer, offset, bytes_per_row, .. } => {
                 let row = 4 * width as u64;
-                let end = bytes_per_row.checked_mul(height as u64 - 1).and_then(|end| end.checked_add(offset + row));
+                let end = bytes_per_row
+                    .checked_mul(height as u64 - 1)
+                    .and_then(|end| end.checked_add(offset + row));
                 if offset % 4 != 0 || bytes_per_row % 4 != 0 || *bytes_per_row < row {
-                    return Err(format!("rows of {bytes_per_row} bytes from {offset}; a row takes {row}, and both must be multiples of 4"));
+                    return Err(format!(
+                        "rows of {bytes_per_row} bytes from {offset}; a row takes {row}, and both must be multiples of 4"
+                    ));
                 }
                 if end.is_none_or(|end| end > buffer.size()) {
-                    return Err(format!("a buffer of {} bytes, too few for {width} x {height} pixels", buffer.size()));
+                    return Err(format!(
+                        "a buffer of {} bytes, too few for {width} x {height} pixels",
+                        buffer.size()
+                    ));
                 }
                 if !buffer.usage().contains(wgpu::BufferUsages::COPY_SRC) {
                     return Err("a buffer without the usage COPY_SRC".into());
@@ -95,13 +106,20 @@ impl Gpu {
     /// [`Self::take_commands`] returns the commands.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for frames of another size or form, and those of [`Backend::prepare`].
-    pub(crate) fn prepare_frames(&mut self, plan: &Plan, frames: [&Frame; 2], size: (usize, usize)) -> Result<()> {
+    /// [`Error::Mismatch`] for frames of another size or form, and those of [`prepare`](crate::backend::Backend::prepare).
+    pub(crate) fn prepare_frames(
+        &mut self,
+        plan: &Plan,
+        frames: [&Frame; 2],
+        size: (usize, usize),
+    ) -> Result<()> {
         for (side, frame) in ["left", "right"].into_iter().zip(frames) {
             frame.check(size).map_err(|reason| Error::Mismatch(format!("the {side} frame is {reason}")))?;
         }
         if frames[0].is_bgra() != frames[1].is_bgra() {
-            return Err(Error::Mismatch("one frame is RGBA and the other BGRA; give both in one order".into()));
+            return Err(Error::Mismatch(
+                "one frame is RGBA and the other BGRA; give both in one order".into(),
+            ));
         }
         self.collected = Some(Vec::new());
         let mut state = self.ready(plan)?;
@@ -192,13 +210,19 @@ fn copy(
         Frame::Buffer { buffer, offset: first, bytes_per_row, .. } => {
             let (row, start) = (4 * width as u64, first + y as u64 * bytes_per_row + 4 * x as u64);
             let per_row = 4 * u64::from(pitch);
-            if *bytes_per_row == per_row {
+            if *bytes_per_row == per_row && x == 0 {
                 let bytes = per_row * (height as u64 - 1) + row;
                 encoder.copy_buffer_to_buffer(buffer, start, to, offset, bytes);
                 return;
             }
             for y in 0..height as u64 {
-                encoder.copy_buffer_to_buffer(buffer, start + y * bytes_per_row, to, offset + y * per_row, row);
+                encoder.copy_buffer_to_buffer(
+                    buffer,
+                    start + y * bytes_per_row,
+                    to,
+                    offset + y * per_row,
+                    row,
+                );
             }
         }
     }

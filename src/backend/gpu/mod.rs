@@ -15,6 +15,7 @@ mod commands;
 mod convergence;
 mod device;
 mod fit;
+mod frames;
 mod kernel;
 mod pace;
 mod probe;
@@ -46,11 +47,12 @@ use commands::{Command, Pipeline, Pipelines, Recorder};
 use convergence::Convergence;
 use device::Device;
 pub use device::FaultInjection;
+pub use frames::{DeviceMap, Frame};
 pub use kernel::{Bound, Kernel, MAX_LOOP_ITERATIONS};
 use queue::Recording;
 pub use shader::{Constant, Shader, binding_number};
+use stages::{Unpacking, record, record_levels, record_upload};
 pub use stages::{kernels, other_kernels};
-use stages::{record, record_levels, record_upload};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -65,6 +67,8 @@ pub struct Gpu {
     device: Device,
     pipelines: Pipelines,
     recording: Recording,
+    /// For a match on a caller's device: the commands so far, which the caller submits.
+    collected: Option<Vec<wgpu::CommandBuffer>>,
     timer: Option<Timer>,
     state: Option<State>,
     /// State of the other size of a double-size match, kept if both fit in memory.
@@ -82,8 +86,8 @@ struct State {
     commands: Commands,
     /// The messages that were sent. All others count as 0, whatever is stored.
     messages: SentMessages,
-    /// The commands that upload the pair.
-    upload: Arc<[Command]>,
+    /// The commands that unpack the uploaded pair.
+    upload: HashMap<Unpacking, Arc<[Command]>>,
     /// Words of an image, for upload.
     words: Vec<u32>,
 }
@@ -114,15 +118,20 @@ impl Gpu {
     /// [`crate::Error::Device`] without a driver or if the device cannot be opened;
     /// [`crate::Error::Execution`] if no device has that name.
     pub async fn open_async(wanted: Option<&str>, faults: FaultInjection) -> Result<Self> {
-        Ok(Self {
-            device: Device::open(wanted, faults).await?,
+        Device::open(wanted, faults).await.map(Self::on)
+    }
+
+    fn on(device: Device) -> Self {
+        Self {
+            device,
             pipelines: HashMap::new(),
             recording: Recording::default(),
+            collected: None,
             timer: None,
             state: None,
             other: None,
             requests: Requests::default(),
-        })
+        }
     }
 
     /// Compiles the kernels of a match in parallel. Those that a stage takes in special cases are compiled on first use.
@@ -223,18 +232,54 @@ impl Gpu {
         let mut buffers = Buffers::new(&mut self.device, plan)?;
         self.compile(plan)?;
         let commands = self.all_commands(plan, &mut buffers)?;
-        let upload =
-            self.recorded_at(0, plan, &buffers, 0.0, None, |recorder| record_upload(recorder, false))?;
+        let upload = HashMap::new();
         let (pitch, rows) = uploaded_rows(plan, &buffers);
         let words = pitch as usize * rows;
         let messages = SentMessages::none(plan.levels.len());
         Ok(State { plan: plan.clone(), buffers, commands, messages, upload, words: vec![0; words] })
     }
 
+    /// The state for `plan`, reused if it fits.
+    fn ready(&mut self, plan: &Plan) -> Result<State> {
+        if self.state.as_ref().is_some_and(|state| plan.fits(&state.plan)) {
+            // The maps stay; finish what was recorded for them.
+            self.submit()?;
+        }
+        self.discard();
+        self.device.traffic = Traffic::default();
+        if !self.state.as_ref().is_some_and(|state| plan.fits(&state.plan)) {
+            std::mem::swap(&mut self.state, &mut self.other);
+        }
+        let state = match self.state.take() {
+            Some(mut state) if plan.fits(&state.plan) => {
+                if state.plan.core != plan.core {
+                    state.plan = plan.clone();
+                    state.commands.retain(|(run, _), _| run.stage != Stage::RightView);
+                }
+                state
+            }
+            // Free the match before the last one before allocating.
+            older => {
+                drop(older);
+                let most = u64::from(plan.memory) << 20;
+                if self.other.as_ref().is_some_and(|other| other.buffers.bytes() + plan.bytes() > most) {
+                    self.other = None;
+                }
+                match self.begin(plan) {
+                    Err(Error::Memory(_)) if self.other.take().is_some() => self.begin(plan)?,
+                    begun => begun?,
+                }
+            }
+        };
+        let held = [Some(&state), self.other.as_ref()].into_iter().flatten();
+        self.device.traffic.bytes_held = held.map(|state| state.buffers.bytes()).sum();
+        Ok(state)
+    }
+
     /// Uploads the pair and its label ranges.
     fn load(&mut self, state: &mut State, prepared: &Prepared) -> Result<()> {
-        let State { plan, buffers, words, upload, messages, .. } = state;
-        *messages = SentMessages::none(plan.levels.len());
+        self.reset(state)?;
+        let State { plan, buffers, words, .. } = state;
         let device = &mut self.device;
         let (pair, pitch) = (&prepared.pair, buffers.levels[0].pixel_pitch);
         let array = |data: Data| buffers.rows(plan, data);
@@ -261,6 +306,17 @@ impl Gpu {
             array(Data::LabelRange(z))
                 .write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
         }
+        if narrow {
+            self.unpack(state, Unpacking::default())?;
+        }
+        self.device.check()
+    }
+
+    /// Starts a match: no messages, all labels, zeros where they are needed.
+    fn reset(&mut self, state: &mut State) -> Result<()> {
+        let State { plan, buffers, messages, .. } = state;
+        *messages = SentMessages::none(plan.levels.len());
+        let array = |data: Data| buffers.rows(plan, data);
         for data in &buffers.zeroed {
             array(*data).held().try_for_each(|(buffer, bytes)| self.clear(buffer, &bytes))?;
         }
@@ -273,13 +329,21 @@ impl Gpu {
         }
         let size = buffers.all_groups.size();
         encoder.copy_buffer_to_buffer(&buffers.all_groups, 0, &buffers.groups, 0, size);
-        if narrow {
-            // The upload is no run of a stage, so it is not timed.
-            let timer = self.timer.take();
-            self.record(upload)?;
-            self.timer = timer;
+        Ok(())
+    }
+
+    /// Unpacks the uploaded pair.
+    fn unpack(&mut self, state: &mut State, unpacking: Unpacking) -> Result<()> {
+        let State { plan, buffers, upload, .. } = state;
+        if !upload.contains_key(&unpacking) {
+            let record = |recorder: &mut Recorder| record_upload(recorder, unpacking);
+            upload.insert(unpacking, self.recorded_at(0, plan, buffers, 0.0, None, record)?);
         }
-        self.device.check()
+        // The upload is no run of a stage, so it is not timed.
+        let timer = self.timer.take();
+        let recorded = self.record(&upload[&unpacking]);
+        self.timer = timer;
+        recorded
     }
 
     fn convergence_at(&self) -> (wgpu::Buffer, Range<u64>) {
@@ -348,39 +412,9 @@ impl Backend for Gpu {
     }
 
     fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()> {
-        if self.state.as_ref().is_some_and(|state| plan.fits(&state.plan)) {
-            // The maps stay; finish what was recorded for them.
-            self.submit()?;
-        }
-        self.discard();
-        self.device.traffic = Traffic::default();
-        if !self.state.as_ref().is_some_and(|state| plan.fits(&state.plan)) {
-            std::mem::swap(&mut self.state, &mut self.other);
-        }
-        let mut state = match self.state.take() {
-            Some(mut state) if plan.fits(&state.plan) => {
-                if state.plan.core != plan.core {
-                    state.plan = plan.clone();
-                    state.commands.retain(|(run, _), _| run.stage != Stage::RightView);
-                }
-                state
-            }
-            // Free the match before the last one before allocating.
-            older => {
-                drop(older);
-                let most = u64::from(plan.memory) << 20;
-                if self.other.as_ref().is_some_and(|other| other.buffers.bytes() + plan.bytes() > most) {
-                    self.other = None;
-                }
-                match self.begin(plan) {
-                    Err(Error::Memory(_)) if self.other.take().is_some() => self.begin(plan)?,
-                    begun => begun?,
-                }
-            }
-        };
+        self.collected = None;
+        let mut state = self.ready(plan)?;
         self.load(&mut state, &prepared)?;
-        let held = [Some(&state), self.other.as_ref()].into_iter().flatten();
-        self.device.traffic.bytes_held = held.map(|state| state.buffers.bytes()).sum();
         self.state = Some(state);
         Ok(())
     }

@@ -101,7 +101,10 @@ impl Gpu {
             if let Some(timer) = &mut self.timer {
                 timer.submit(&mut self.device, &mut encoder)?;
             }
-            self.device.submit(encoder, work >= self.device.pace.work())?;
+            match &mut self.collected {
+                Some(collected) => collected.push(encoder.finish()),
+                None => self.device.submit(encoder, work >= self.device.pace.work())?,
+            }
         }
         self.device.check()
     }

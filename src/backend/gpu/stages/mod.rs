@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::plan::Plan;
 use crate::stage::Stage;
 use std::ops::Range;
+pub(super) use upload::Unpacking;
 
 macro_rules! declare {
     (
@@ -71,9 +72,9 @@ pub(super) fn record_levels(stage: Stage) -> Option<RecordLevels> {
     OVER_LEVELS.into_iter().find(|(name, _)| *name == stage.name()).map(|(_, record)| record)
 }
 
-/// Records the unpacking of the uploaded pair. If `is_opaque`, no pixel is masked.
-pub(super) fn record_upload(r: &mut Recorder, is_opaque: bool) -> Result<()> {
-    upload::record(r, is_opaque)
+/// Records the unpacking of the uploaded pair.
+pub(super) fn record_upload(r: &mut Recorder, unpacking: Unpacking) -> Result<()> {
+    upload::record(r, unpacking)
 }
 
 /// Records the transposition of the graph: the factors that hold each pixel.

@@ -7,16 +7,29 @@ use crate::backend::gpu::uniform::full_pitch;
 use crate::error::Result;
 
 shader! {
-    "upload"(plan, level) { full_pitch: u32, is_opaque: u32 }
+    "upload"(plan, level) { full_pitch: u32, is_opaque: u32, is_bgra: u32 }
     unpack { left_words, right_words, left, right } if plan.full.is_none() => Variant::new(0);
     halve { full_left_words, full_right_words, full_left, full_right, left, right } if plan.full.is_some() => {
         Variant::new(2 * 4)
     };
 }
 
-/// Unpacks the words of the pair. If `is_opaque`, their highest byte counts for nothing; otherwise it masks pixels.
-pub(super) fn record(r: &mut Recorder, is_opaque: bool) -> Result<()> {
+/// The meaning of the bytes of a word.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(in crate::backend::gpu) struct Unpacking {
+    /// Whether the highest byte counts for nothing; otherwise it masks pixels.
+    pub(in crate::backend::gpu) is_opaque: bool,
+    /// Whether the lowest byte is blue; otherwise it is red.
+    pub(in crate::backend::gpu) is_bgra: bool,
+}
+
+/// Unpacks the words of the pair.
+pub(super) fn record(r: &mut Recorder, unpacking: Unpacking) -> Result<()> {
     let (plan, width) = (r.plan, r.params().width);
-    let own = Uniform { full_pitch: full_pitch(plan), is_opaque: is_opaque.into() };
+    let own = Uniform {
+        full_pitch: full_pitch(plan),
+        is_opaque: unpacking.is_opaque.into(),
+        is_bgra: unpacking.is_bgra.into(),
+    };
     r.rows(&if plan.full.is_some() { halve(plan, 0) } else { unpack(plan, 0) }, &own, width)
 }
