@@ -7,16 +7,31 @@
 //! The frames are matched as they are: row offsets, differences of sharpness, and noise are measured on the host,
 //! and so they are neither found nor corrected here. With these corrections off, the maps are those of a
 //! [`Matcher`](crate::Matcher), bit for bit.
+//!
+//! ```no_run
+//! use mrfgs::Method;
+//! use mrfgs::on_device::{DeviceMatcher, Frame, Gpu, wgpu};
+//!
+//! # fn of(info: wgpu::AdapterInfo, device: wgpu::Device, queue: wgpu::Queue, frames: Vec<[wgpu::Texture; 2]>) -> mrfgs::Result<()> {
+//! let gpu = Gpu::from_wgpu(&info, device.clone(), queue.clone());
+//! let mut matcher = DeviceMatcher::new(gpu, (640, 480), 0..=63, &Method::fast())?;
+//! for [left, right] in frames {
+//!     let found = matcher.encode(&Frame::Texture(left), &Frame::Texture(right))?;
+//!     queue.submit(found.commands);
+//!     // Bind `found.disparity.buffer` in a shader: `i32` in 1/256 px, in rows of `bytes_per_row` bytes.
+//! }
+//! # Ok(())
+//! # }
+//! ```
 
 use super::check::check;
 use crate::backend::Backend;
-pub use crate::backend::gpu::{DeviceMap, Frame, Gpu};
+pub use crate::backend::gpu::{DeviceMap, Frame, Gpu, wgpu};
 use crate::error::{Error, Result};
 use crate::options::{DisparityRange, Method};
 use crate::plan::Plan;
 use crate::program::tiles::Tiles;
 use crate::program::{Program, Step};
-pub use wgpu;
 
 /// Matches pairs of one size over one range on a device.
 pub struct DeviceMatcher {

@@ -7,6 +7,7 @@ use crate::backend::Map;
 use crate::error::{Error, Result};
 use crate::plan::Plan;
 use crate::stage::Data;
+pub use ::wgpu;
 
 /// A view on a device, in 8 bits per channel. Alpha counts for nothing.
 #[derive(Clone, Debug)]

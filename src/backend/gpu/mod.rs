@@ -47,7 +47,7 @@ use commands::{Command, Pipeline, Pipelines, Recorder};
 use convergence::Convergence;
 use device::Device;
 pub use device::FaultInjection;
-pub use frames::{DeviceMap, Frame};
+pub use frames::{DeviceMap, Frame, wgpu};
 pub use kernel::{Bound, Kernel, MAX_LOOP_ITERATIONS};
 use queue::Recording;
 pub use shader::{Constant, Shader, binding_number};
