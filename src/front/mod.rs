@@ -1,7 +1,6 @@
 //! The front end (section 2.4): everything that a match derives from the images alone, before any cost is
 //! computed.
 
-pub mod check;
 pub mod conditioning;
 #[cfg(feature = "cameras")]
 pub mod drift;
@@ -17,12 +16,21 @@ pub mod matches;
 mod paper;
 mod parts;
 mod prepared;
+mod range;
 #[cfg(feature = "cameras")]
 mod unrectified;
+mod warnings;
 #[cfg(feature = "paper")]
 pub mod zones;
 
 pub use prepared::Prepared;
+
+/// Warns of likely faults of a pair, and finds its disparity range.
+pub mod check {
+    pub use super::parts::Part;
+    pub use super::range::{beyond, goes_beyond, range, range_of_cameras, wider};
+    pub use super::warnings::{Warning, damaged, warnings, warnings_of};
+}
 
 use crate::error::{Error, Purpose, Result};
 use crate::image::Pair;
