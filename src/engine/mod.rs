@@ -74,7 +74,7 @@ pub async fn solve(
 ///
 /// # Errors
 /// The errors of [`solve`].
-pub async fn start(
+pub(crate) async fn start(
     backend: &mut dyn Backend,
     program: &Program,
     pair: &Pair,
@@ -89,14 +89,18 @@ pub async fn start(
 ///
 /// # Errors
 /// The errors of the backend.
-pub async fn finish(backend: &mut dyn Backend, mut started: MatchRun, pair: &Pair) -> Result<Solution> {
+pub(crate) async fn finish(
+    backend: &mut dyn Backend,
+    mut started: MatchRun,
+    pair: &Pair,
+) -> Result<Solution> {
     let quiet = &mut |_: Progress| ControlFlow::Continue(());
     started.advance(backend, pair, quiet, None, None).await?;
     Ok(started.solution())
 }
 
 /// A match that is running through its steps.
-pub struct MatchRun {
+pub(crate) struct MatchRun {
     program: Program,
     /// The next step.
     next: usize,

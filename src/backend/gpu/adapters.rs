@@ -194,7 +194,7 @@ pub fn has_automatic() -> bool {
 }
 
 /// Like `has_automatic`, for browsers.
-pub async fn has_automatic_async() -> bool {
+pub(crate) async fn has_automatic_async() -> bool {
     if !may_have_gpu() {
         return false;
     }

@@ -37,7 +37,8 @@ use crate::plan::{LevelPlan, Plan};
 use crate::program::schedule::split;
 use crate::program::{Program, Run, joined, sharing, together};
 use crate::stage::Data;
-pub use adapters::{DeviceInfo, has_automatic_async, may_have_gpu};
+pub(crate) use adapters::has_automatic_async;
+pub use adapters::may_have_gpu;
 #[cfg(not(target_arch = "wasm32"))]
 pub use adapters::{devices, has_automatic};
 use buffers::Buffers;
