@@ -396,7 +396,7 @@ impl Plan {
         self.method.cost.matching.facts().colour_weight
     }
 
-    /// The variance of grey (in squared 8-bit levels, times [`CENSUS_PLACES`] squared) above which colour has
+    /// The variance of grey (in squared 8-bit levels, times `CENSUS_PLACES` squared) above which colour has
     /// full weight.
     #[must_use]
     pub fn colour_variance(&self) -> u32 {

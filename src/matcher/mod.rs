@@ -139,6 +139,7 @@ impl Matcher {
     ///
     /// # Errors
     /// [`Error::Execution`] for an invalid number of threads, and the error of `gpu` unless it falls back.
+    #[doc(hidden)]
     pub fn on(gpu: Result<Gpu>, falls_back: bool, execution: &Execution) -> Result<Self> {
         let threads = Arc::new(Threads::new(execution.threads)?);
         Self::build(Method::default(), Some(gpu), falls_back, threads, execution.timings)
