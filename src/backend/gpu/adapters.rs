@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// An adapter as listed by `mrfgs devices`.
+#[cfg(not(target_arch = "wasm32"))]
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct DeviceInfo {
