@@ -14,7 +14,7 @@ use crate::threads::prelude::*;
 use std::ops::Range;
 
 /// The code of an empty slot: the neighbour is outside the image, masked, or missing.
-pub const NO_MEMBER: u8 = u8::MAX;
+pub(crate) const NO_MEMBER: u8 = u8::MAX;
 const RADIUS: i32 = GRAPH_WINDOW as i32 / 2;
 /// Rows of pixels whose factors are collected together.
 const BAND: usize = 64;
@@ -62,7 +62,7 @@ impl Incoming {
 
 /// (dx, dy) of the member with this `code`: its position in the window, in raster order.
 #[must_use]
-pub fn offset(code: u8) -> (i32, i32) {
+pub(crate) fn offset(code: u8) -> (i32, i32) {
     let code = i32::from(code);
     (code % GRAPH_WINDOW as i32 - RADIUS, code / GRAPH_WINDOW as i32 - RADIUS)
 }

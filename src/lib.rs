@@ -85,10 +85,10 @@
 //! - [`evaluation`] compares maps with ground truth.
 //! - [`image`] reads and writes images and maps.
 //! - [`threads`] has the default number of threads, and limits the threads outside matchers.
-//! - [`low_level`] has the parts of the engine, for extending or studying it.
 //!
-//! Beliefs, messages and evidence are costs in integers (see [`low_level::plan`]), so the CPU path and every GPU give the same
-//! maps bit for bit, whatever the number of threads.
+//! Beliefs, messages and evidence are costs in integers, so the CPU path and every GPU give the same maps bit for bit, whatever the
+//! number of threads. (`low_level`, which is not documented, has what the tests and front ends of mrfgs need of the engine, and may
+//! change with every version.)
 //!
 //! # Features
 //!
@@ -115,6 +115,8 @@ pub mod evaluation;
 mod front;
 mod graph;
 pub mod image;
+#[doc(hidden)]
+pub mod low_level;
 pub mod maps;
 mod matcher;
 mod memory;
@@ -153,39 +155,3 @@ pub use matcher::on_device;
 pub use matcher::{Answer, AutoRange, Builder, Job, Matched, Matcher, Search, Timing};
 pub use options::Method;
 pub use watch::Progress;
-
-/// The parts of the engine, for extending or studying it. They change more often than the rest.
-pub mod low_level {
-    macro_rules! parts {
-        ($( #[doc = $about:literal] $name:ident; )*) => {
-            $( #[doc = $about] pub mod $name { pub use crate::$name::*; } )*
-        };
-    }
-
-    parts! {
-        /// The backends, which run the stages: the CPU path and GPUs.
-        backend;
-        /// Runs a list of steps on a backend.
-        engine;
-        /// Data that a match derives from a pair: illumination, texture zones, sparse matches, label ranges.
-        front;
-        /// The members of the dependency factors.
-        graph;
-        /// The plan of a match, known before it runs: levels, integer parameters, bounds, memory.
-        plan;
-        /// A lower bound on the cost of message passing, to compare a machine with.
-        roofline;
-        /// Data that belongs to one process, and how it behaves when the process forks.
-        process;
-        /// A match as a list of steps: the schedule, and tiles for pairs that exceed the memory.
-        program;
-        /// The stages, exactly defined.
-        stage;
-        /// Reads small text files, and quotes them in messages.
-        text;
-        /// Progress and time of a match.
-        watch;
-        /// Weights in integers, and the functions that they come from.
-        weights;
-    }
-}

@@ -11,8 +11,8 @@
 
 mod arithmetic;
 pub mod patches;
-pub mod planes;
-pub mod support;
+pub(crate) mod planes;
+pub(crate) mod support;
 pub mod votes;
 
 use crate::error::Result;
@@ -21,43 +21,44 @@ use crate::options::{
 };
 use std::ops::Range;
 
+pub(crate) use arithmetic::EvidenceScale;
 use arithmetic::units;
-pub use arithmetic::{EvidenceScale, HARD_CAP, Truncation, TruncationRule, UNITS_PER_NAT, VolumeWidth};
+pub use arithmetic::{HARD_CAP, Truncation, TruncationRule, UNITS_PER_NAT, VolumeWidth};
 
 /// Largest matching cost at level 0, in cost units.
 pub const COST_MAX: u8 = 254;
 /// Cost units per differing census bit.
-pub const CENSUS_BIT_COST: u32 = 4;
+pub(crate) const CENSUS_BIT_COST: u32 = 4;
 /// Largest number of differing census bits that counts.
-pub const CENSUS_BITS: u32 = 40;
+pub(crate) const CENSUS_BITS: u32 = 40;
 /// Truncation of the colour difference, in 8-bit levels summed over the channels.
-pub const COLOUR_MOST: u32 = 64;
+pub(crate) const COLOUR_MOST: u32 = 64;
 /// Horizontal radius of the 9 x 7 window of census and contrast.
-pub const CENSUS_RADIUS_X: u32 = 4;
+pub(crate) const CENSUS_RADIUS_X: u32 = 4;
 /// Vertical radius of the window of census and contrast.
-pub const CENSUS_RADIUS_Y: u32 = 3;
+pub(crate) const CENSUS_RADIUS_Y: u32 = 3;
 /// Number of pixels in the window of census and contrast.
-pub const CENSUS_PLACES: u32 = (2 * CENSUS_RADIUS_X + 1) * (2 * CENSUS_RADIUS_Y + 1);
+pub(crate) const CENSUS_PLACES: u32 = (2 * CENSUS_RADIUS_X + 1) * (2 * CENSUS_RADIUS_Y + 1);
 /// Fractional bits of the costs of level 1 and coarser.
-pub const COST_FRACTION_BITS: u32 = 8;
+pub(crate) const COST_FRACTION_BITS: u32 = 8;
 /// Rows per part of the ring on a device that holds only some rows of level 0 at a time.
-pub const RING_PART: usize = 32;
+pub(crate) const RING_PART: usize = 32;
 /// Rows on a device start at multiples of this many bytes, like bindings.
-pub const ROW_ALIGN: usize = 256;
+pub(crate) const ROW_ALIGN: usize = 256;
 /// Side of the window that holds a dependency factor's members.
-pub const GRAPH_WINDOW: usize = 7;
+pub(crate) const GRAPH_WINDOW: usize = 7;
 /// Labels are stored in blocks of this many; the last block is padded.
-pub const LABEL_BLOCK: usize = 16;
+pub(crate) const LABEL_BLOCK: usize = 16;
 /// Pixels of a row that share a label window.
-pub const WINDOW_RUN: usize = 8;
+pub(crate) const WINDOW_RUN: usize = 8;
 /// The first label of a label window is a multiple of this.
-pub const WINDOW_STEP: usize = 4;
+pub(crate) const WINDOW_STEP: usize = 4;
 /// Candidates are labels at most this far above the pixel's smallest belief, in units: 2 nats.
-pub const WINDOW_SLACK: u16 = 8;
+pub(crate) const WINDOW_SLACK: u16 = 8;
 /// Radius of the search for candidates around a label window's coarse pixels, in coarse pixels.
-pub const WINDOW_REACH: usize = 2;
+pub(crate) const WINDOW_REACH: usize = 2;
 /// Minimum number of labels in a window on either side of each candidate.
-pub const WINDOW_MARGIN: i32 = 2;
+pub(crate) const WINDOW_MARGIN: i32 = 2;
 
 // The largest costs of a label agree with the facts in the options.
 const _: () = {
@@ -79,7 +80,7 @@ pub struct LevelPlan {
     pub min: i32,
     /// Number of labels, up to ceil(max / 2^z).
     pub labels: usize,
-    /// Labels with padding: `labels` rounded up to whole blocks of [`LABEL_BLOCK`].
+    /// Labels with padding: `labels` rounded up to whole blocks of `LABEL_BLOCK`.
     pub stride: usize,
     /// Conversion from cost to evidence at this level.
     pub evidence: EvidenceScale,
@@ -395,7 +396,7 @@ impl Plan {
         self.method.cost.matching.facts().colour_weight
     }
 
-    /// The variance of grey (in squared 8-bit levels, times [`CENSUS_PLACES`] squared) above which colour has
+    /// The variance of grey (in squared 8-bit levels, times `CENSUS_PLACES` squared) above which colour has
     /// full weight.
     #[must_use]
     pub fn colour_variance(&self) -> u32 {

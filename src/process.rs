@@ -50,7 +50,7 @@ impl<T> Drop for Own<T> {
 
 /// A value that each process makes for itself when it first needs it.
 #[derive(Debug)]
-pub struct PerProcess<T> {
+pub(crate) struct PerProcess<T> {
     first: OnceLock<Box<Link<T>>>,
 }
 
@@ -64,12 +64,12 @@ struct Link<T> {
 impl<T> PerProcess<T> {
     /// No process has a value yet.
     #[must_use]
-    pub const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { first: OnceLock::new() }
     }
 
     /// The value of this process. `T::default` must be quick: a child that is forked during it waits forever.
-    pub fn get(&self) -> &T
+    pub(crate) fn get(&self) -> &T
     where
         T: Default,
     {

@@ -22,7 +22,7 @@ pub fn read(path: &Path, max_bytes: u64, what: &str) -> Result<Vec<u8>> {
 
 /// Text for quoting in a message: one line of limited length, without control characters.
 #[must_use]
-pub fn one_line(text: &str) -> String {
+pub(crate) fn one_line(text: &str) -> String {
     const MAX_LENGTH: usize = 160;
     let words = text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|word| !word.is_empty());
     let line = words.collect::<Vec<_>>().join(" ");

@@ -3,14 +3,14 @@
 use crate::options::Method;
 
 /// Weight of the centre of the median's window, the largest weight.
-pub const MEDIAN_WEIGHT: u8 = 127;
+pub(crate) const MEDIAN_WEIGHT: u8 = 127;
 /// The largest part of the centre's weight that distance alone subtracts.
 const MEDIAN_SPACE: f64 = 96.0;
 /// The row spacing in the windows of the median is 2 to this many pixels; all columns are used.
-pub const WINDOW_ROW_BITS: u32 = 1;
+pub(crate) const WINDOW_ROW_BITS: u32 = 1;
 /// Spacing of the places in the two windows that fill pixels, along rows and along columns: 2 to this many pixels.
 /// The first window reaches far in all directions, the second along rows, where roads and floors keep one disparity.
-pub const FILL_STEP_BITS: [[u32; 2]; 2] = [[3, 3], [4, 0]];
+pub(crate) const FILL_STEP_BITS: [[u32; 2]; 2] = [[3, 3], [4, 0]];
 /// Side of these windows, in places.
 const FILL_WINDOW: usize = 13;
 /// Spatial sigma of these windows, in places.
@@ -19,7 +19,7 @@ const FILL_SIGMA_SPACE: f64 = 4.3;
 const FILL_SIGMA_RANGE: f64 = 3.0;
 
 /// Number of differences in colour: the sum over three channels of 8 bits.
-pub const COLOUR_DIFFERENCES: usize = 3 * 255 + 1;
+pub(crate) const COLOUR_DIFFERENCES: usize = 3 * 255 + 1;
 /// Weight of a vote after a step along a row and along a column, between half-size pixels of the same colour: about
 /// exp(-sqrt(2) / 134) and exp(-sqrt(2) / 6.7). Disparities change from row to row on the ground, and stay along rows.
 const VOTE_STEP: [f64; 2] = [0.9895, 0.81];
@@ -29,7 +29,7 @@ const VOTE_EDGE: f64 = 0.0345;
 /// Weights of votes after a step along a row, and along a column, in 1/65536, by the difference d in colour between the two
 /// half-size pixels: round(65536 a exp(-0.0345 d)), with a = 0.9895 along rows and 0.81 along columns.
 #[must_use]
-pub fn vote_weights() -> [Vec<u32>; 2] {
+pub(crate) fn vote_weights() -> [Vec<u32>; 2] {
     let weight = |step: f64, difference: usize| {
         (65536.0 * step * libm::exp(-VOTE_EDGE * difference as f64) + 0.5).floor() as u32
     };
@@ -41,7 +41,7 @@ const PATCH_FADE: f64 = 0.961;
 /// The decrease of that share's logarithm per level of colour difference.
 const PATCH_EDGE: f64 = 0.0185;
 /// From this difference on, the share is 0.
-pub const PATCH_DIFFERENCES: usize = 336;
+pub(crate) const PATCH_DIFFERENCES: usize = 336;
 
 /// Share of the weight that passes from a patch to the next one, in 1/256, by the difference d in colour:
 /// round(256 x 0.961 exp(-0.0185 d)), and 0 at the last.
@@ -51,7 +51,7 @@ pub fn patch_weights() -> Vec<u32> {
     (0..=PATCH_DIFFERENCES).map(|difference| (share(difference) + 0.5).floor() as u32).collect()
 }
 
-/// Bilateral weights of the median's window, as 8-bit integers: max(0, [`MEDIAN_WEIGHT`] - colour - space).
+/// Bilateral weights of the median's window, as 8-bit integers: max(0, `MEDIAN_WEIGHT` - colour - space).
 ///
 /// space = round(96 (1 - exp(-(dx^2 + dy^2) / 2 `sigma_space`^2))), with dx and dy in steps of the window.
 /// colour = the sum over r, g and b of the differences of the guides, times 2^`doublings`, where a guide is

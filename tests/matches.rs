@@ -3,9 +3,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
+use mrfgs::check::{self, Warning};
 use mrfgs::error::{Error, RangeError};
 use mrfgs::image::{Image, Pair, Plane, Rect, calib::Calibration, pfm, read};
-use mrfgs::low_level::front::check::{self, Warning};
 use mrfgs::low_level::front::label_range::{self, LabelRanges, MIN_MATCHES};
 use mrfgs::low_level::front::matches::{self, SparseMatch};
 use mrfgs::maps::FRACTION;

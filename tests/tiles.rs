@@ -14,10 +14,9 @@ use mrfgs::low_level::engine::Solution;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::program::tiles::{OVERLAP, Tiles};
 use mrfgs::low_level::program::together::streamed;
-use mrfgs::low_level::watch::Progress;
 use mrfgs::maps::{Maps, has_disparity};
 use mrfgs::options::{DisparityRange, LeftRightCheck, MatchSize, Method, PRESETS};
-use mrfgs::{Error, Matcher};
+use mrfgs::{Error, Matcher, Progress};
 use std::ops::{ControlFlow, Range};
 use std::path::Path;
 

@@ -3,10 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
+use mrfgs::check::{self, Part, Warning};
 use mrfgs::error::{Error, RangeError};
 use mrfgs::image::{Image, Pair, Plane, Rect, calib::Calibration, grey, read};
 use mrfgs::low_level::engine::Inspection;
-use mrfgs::low_level::front::check::{self, Part, Warning};
 use mrfgs::maps::{FRACTION, Maps};
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::{AutoRange, Matched, Matcher};

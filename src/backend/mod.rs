@@ -3,9 +3,9 @@
 //! Only [`crate::program`] knows the order of stages. From the matching cost on, everything is integer
 //! arithmetic, so all backends give the same bits. The documentation of each [`Stage`] is its definition.
 
-pub mod cpu;
-pub mod gpu;
-pub mod probe;
+pub(crate) mod cpu;
+pub(crate) mod gpu;
+pub(crate) mod probe;
 
 use crate::error::Result;
 use crate::front::Prepared;

@@ -61,7 +61,7 @@ const KNOWN: &str = "is no calibration of a known form: expected the entries of 
 type Read = fn(&[Entries]) -> Option<Result<StereoCalibration>>;
 
 /// The forms of calibrations, each with its name. The first one that takes the files counts.
-const FORMS: [(&str, Read); 16] = [
+const FORMS: &[(&str, Read)] = &[
     ("Kalibr's", |files| alone(files, kalibr::is, kalibr::read)),
     ("KITTI's", |files| alone(files, kitti::is, kitti::read)),
     ("Basalt's", |files| alone(files, basalt::is, basalt::read)),

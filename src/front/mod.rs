@@ -1,15 +1,14 @@
 //! The front end (section 2.4): everything that a match derives from the images alone, before any cost is
 //! computed.
 
-pub mod check;
-pub mod conditioning;
+pub(crate) mod conditioning;
 #[cfg(feature = "cameras")]
 pub mod drift;
 #[cfg(feature = "cameras")]
 mod exchanged;
 mod filter;
 #[cfg(feature = "paper")]
-pub mod illumination;
+pub(crate) mod illumination;
 #[cfg(feature = "paper")]
 pub mod label_range;
 pub mod matches;
@@ -17,12 +16,21 @@ pub mod matches;
 mod paper;
 mod parts;
 mod prepared;
+mod range;
 #[cfg(feature = "cameras")]
 mod unrectified;
+mod warnings;
 #[cfg(feature = "paper")]
 pub mod zones;
 
 pub use prepared::Prepared;
+
+/// Warns of likely faults of a pair, and finds its disparity range.
+pub mod check {
+    pub use super::parts::Part;
+    pub use super::range::{beyond, goes_beyond, range, range_of_cameras, wider};
+    pub use super::warnings::{Warning, damaged, warnings, warnings_of};
+}
 
 use crate::error::{Error, Purpose, Result};
 use crate::image::Pair;
@@ -36,7 +44,7 @@ use conditioning::Conditioning;
 ///
 /// # Errors
 /// [`Error::Memory`] when the machine cannot hold it, and [`Error::Interrupted`] when the observer breaks.
-pub fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(Pair, Conditioning)> {
+pub(crate) fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(Pair, Conditioning)> {
     memory::check(plan.halving_bytes() + 3 * plan.conditioning_bytes(), Purpose::Match)?;
     let halved = plan.full.is_some();
     let pair = if halved { watch.host("half_size", || Ok(pair.halved()))? } else { pair.clone() };
@@ -57,7 +65,7 @@ pub fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(Pair, C
 ///
 /// # Errors
 /// [`Error::Memory`] when the machine cannot hold it.
-pub fn doubled(pair: &Pair, conditioning: &Conditioning) -> Result<Pair> {
+pub(crate) fn doubled(pair: &Pair, conditioning: &Conditioning) -> Result<Pair> {
     let (width, height) = pair.size();
     // A pixel of the conditioned pair, of the pair at twice its size, and what the filters of one view work on.
     memory::check((18 + 2 * 36 + 84) * (width * height) as u64, Purpose::Match)?;

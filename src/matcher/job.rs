@@ -106,6 +106,7 @@ impl<'a> Job<'a> {
 
     /// `inspect` inspects the running match for diagnosis. It may read any volume and map, which takes time.
     #[cfg(not(target_arch = "wasm32"))]
+    #[doc(hidden)]
     pub fn inspect(self, inspect: impl FnMut(&mut Inspection) -> Result<()> + Send + 'a) -> Self {
         Self { inspect: Some(Box::new(inspect)), ..self }
     }

@@ -24,10 +24,12 @@ pub struct Matched {
     /// The corrections that were made to the pair before it was matched.
     pub conditioning: Conditioning,
     /// The plan of the whole image; [`Plan::doubled`] is its plan at twice the size.
+    #[doc(hidden)]
     pub plan: Plan,
     /// Whether sparse matches found the range.
     pub range_found: bool,
     /// The tiles of the image: one if it was not cut.
+    #[doc(hidden)]
     pub tiles: Tiles,
     /// The backend that ran the stages, in readable form.
     pub ran_on: String,
@@ -38,6 +40,7 @@ pub struct Matched {
     /// The time of every stage, in the order of their first run; empty if they were not timed.
     pub timings: Vec<Timing>,
     /// Data that went through the device.
+    #[doc(hidden)]
     pub traffic: Traffic,
     /// Labels that the volumes of each level held, over all pixels, with padding; summed over all tiles.
     pub cells: Vec<u64>,

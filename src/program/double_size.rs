@@ -4,7 +4,7 @@ use super::{Program, Step};
 
 /// The steps of `own`, then those of `double` on the doubled pair, then the merge.
 #[must_use]
-pub fn follow(own: Program, double: Program) -> Program {
+pub(crate) fn follow(own: Program, double: Program) -> Program {
     let Program { mut frames, mut steps } = own;
     let first = frames.len();
     frames.extend(double.frames);

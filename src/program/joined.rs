@@ -6,7 +6,7 @@ use crate::stage::Stage;
 
 /// `steps` with runs of one stage at successive levels joined, if they touch no level finer than `shared`.
 #[must_use]
-pub fn join(plan: &Plan, shared: usize, steps: Vec<Step>) -> Vec<Step> {
+pub(crate) fn join(plan: &Plan, shared: usize, steps: Vec<Step>) -> Vec<Step> {
     let may_join = |stage: Stage| stage.descriptor().joins && stage.finest_level(plan) >= shared;
     let mut all: Vec<Step> = Vec::new();
     for step in steps {

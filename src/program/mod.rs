@@ -9,17 +9,18 @@
 //! ```
 
 mod compile;
-pub mod double_size;
-pub mod joined;
+pub(crate) mod double_size;
+pub(crate) mod joined;
 mod list;
-pub mod right_view;
+pub(crate) mod right_view;
 #[cfg(test)]
 mod samples;
-pub mod schedule;
-pub mod second_match;
-pub mod sharing;
-pub mod tiled;
-pub mod tiles;
-pub mod together;
+pub(crate) mod schedule;
+pub(crate) mod second_match;
+pub(crate) mod sharing;
+pub(crate) mod tiled;
+pub(crate) mod tiles;
+pub(crate) mod together;
 
-pub use list::{Frame, Program, RowBand, Run, Sent, SentMessages, Step, View};
+pub(crate) use list::{Frame, RowBand, Sent, View};
+pub use list::{Program, Run, SentMessages, Step};

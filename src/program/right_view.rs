@@ -6,7 +6,7 @@ use crate::stage::Stage;
 
 /// The stages that make the right view the left one, up to sub-pixel disparities.
 #[must_use]
-pub fn stages(plan: &Plan) -> Vec<Step> {
+pub(crate) fn stages(plan: &Plan) -> Vec<Step> {
     let between_labels: &[_] =
         if plan.full.is_some() { &[Stage::Refine] } else { &[Stage::Cost, Stage::SubPixel] };
     [&[Stage::SwapViews], between_labels].concat().into_iter().map(Step::of).collect()
@@ -14,7 +14,7 @@ pub fn stages(plan: &Plan) -> Vec<Step> {
 
 /// Adds the right view to `steps`, after the request for the left maps: sub-pixel disparities, map stages.
 #[must_use]
-pub fn follow(plan: &Plan, mut steps: Vec<Step>) -> Vec<Step> {
+pub(crate) fn follow(plan: &Plan, mut steps: Vec<Step>) -> Vec<Step> {
     let is_of_maps = |step: &&Step| step.stage().is_some_and(Stage::is_of_maps);
     let refining: Vec<Step> = steps.iter().filter(is_of_maps).cloned().collect();
     let collect = steps.pop();

@@ -9,7 +9,7 @@ use std::iter;
 
 /// All steps of a match in one piece, of the left view only.
 #[must_use]
-pub fn steps(plan: &Plan) -> Vec<Step> {
+pub(crate) fn steps(plan: &Plan) -> Vec<Step> {
     let mut steps = vec![Step::Condition, Step::Enter(0)];
     steps.extend(estimate(plan));
     steps.extend(post_processing(&plan.method));
@@ -20,7 +20,7 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
 /// From a prepared pair to the disparities of the left view, and to the labels of the right view if these are
 /// computed from the beliefs.
 #[must_use]
-pub fn estimate(plan: &Plan) -> Vec<Step> {
+pub(crate) fn estimate(plan: &Plan) -> Vec<Step> {
     let levels = 0..plan.levels.len();
     let graphs = levels.clone().filter(|&z| plan.floods(z)).map(Stage::Graph);
     let costs = levels.flat_map(|z| {
@@ -94,14 +94,14 @@ fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> 
 
 /// The map stages that the method uses, in the order of the table.
 #[must_use]
-pub fn post_processing(method: &Method) -> Vec<Step> {
+pub(crate) fn post_processing(method: &Method) -> Vec<Step> {
     let taken = Stage::OF_MAPS.iter().filter(|stage| stage.is_taken(method));
     taken.copied().map(Step::of).collect()
 }
 
 /// Splits a flooding at one level into messages and beliefs, for backends that compute them separately.
 #[must_use]
-pub fn split(run: Run) -> Vec<Run> {
+pub(crate) fn split(run: Run) -> Vec<Run> {
     match run.stage {
         Stage::Flood(z) => {
             [Stage::Dependency(z), Stage::Belief(z)].map(|stage| Run { stage, ..run.clone() }).into()

@@ -5,7 +5,7 @@ use crate::stage::Stage;
 
 /// A match of the mirrored pair, then that of `program`, which is in one piece.
 #[must_use]
-pub fn first(program: Program) -> Program {
+pub(crate) fn first(program: Program) -> Program {
     let Program { mut frames, steps } = program;
     let enter = steps.iter().position(|step| matches!(step, Step::Enter(_))).unwrap_or(steps.len());
     let is_of_maps = |step: &Step| step.stage().is_some_and(Stage::is_of_maps);

@@ -46,7 +46,7 @@ fn pairs(plan: &Plan) -> Vec<[Data; 2]> {
 /// The steps of a frame, with graphs freed after the last stage that reads them; `plan`
 /// [shares](Plan::shares) memory if no pair is needed at the same time.
 #[must_use]
-pub fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
+pub(crate) fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
     let lives = lives(plan, &steps);
     let apart = |pair: [Data; 2]| match pair.map(|data| lives.get(&data)) {
         [Some(a), Some(b)] => a.iter().all(|a| b.iter().all(|b| a.end() < b.start() || b.end() < a.start())),

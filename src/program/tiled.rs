@@ -6,7 +6,7 @@ use crate::stage::Stage;
 
 /// The match of `program`, which is in one piece, cut into `tiles`.
 #[must_use]
-pub fn cut(program: &Program, tiles: &Tiles) -> Program {
+pub(crate) fn cut(program: &Program, tiles: &Tiles) -> Program {
     let [whole, ..] = &program.frames[..] else { unreachable!("a frame to match") };
     let width = whole.plan.size().0;
     let mut cut = Program { frames: vec![whole.clone()], steps: vec![Step::Condition, Step::Mosaic(0)] };

@@ -12,7 +12,7 @@ use crate::stage::{Data, Stage, Volume};
 use std::ops::Range;
 
 /// Rows of level 0 that each stage computes in a step, enough to share among threads.
-pub const BAND: usize = 32;
+pub(crate) const BAND: usize = 32;
 
 /// The plan of a match without an inspector: if possible, the steps on level 0 run as a wavefront, and only
 /// the rows between them are held.
@@ -23,7 +23,7 @@ pub fn streamed(plan: &Plan) -> Plan {
 
 /// The steps of a frame, with those on level 0 as a wavefront if possible; `plan` then holds fewer rows.
 #[must_use]
-pub fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
+pub(crate) fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
     let Some((streamed, range, wavefront)) = going_together(plan, &steps) else { return steps };
     let mut all = steps[..range.start].to_vec();
     let sent = sent(plan, &steps[..range.start], &wavefront.stages);

@@ -37,9 +37,9 @@ use super::{Data, Descriptor, Map, maps};
 use crate::options::MatchSize;
 
 /// Weight of a distance of one full-size pixel, as a difference in colour in 8-bit levels.
-pub const AWAY: i32 = 8;
+pub(crate) const AWAY: i32 = 8;
 /// Pixels count if their dissimilarity exceeds the smallest one by less than this, in 8-bit levels.
-pub const NEAR: i32 = 64;
+pub(crate) const NEAR: i32 = 64;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| {

@@ -6,7 +6,7 @@ use crate::plan::Plan;
 pub const NO_LABEL: u16 = u16::MAX;
 
 /// Stands for "no runner-up".
-pub const NO_RUNNER_UP: u16 = u16::MAX;
+pub(crate) const NO_RUNNER_UP: u16 = u16::MAX;
 
 /// An intermediate or final map of a match, one value per pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -15,7 +15,7 @@ pub enum Map {
     Label,
     /// Belief of that label, in units.
     Best,
-    /// The smallest belief of labels more than one away from it; [`NO_RUNNER_UP`] if there are none.
+    /// The smallest belief of labels more than one away from it; `NO_RUNNER_UP` if there are none.
     RunnerUp,
     /// Label index of each pixel of the right view; [`NO_LABEL`] where no left pixel projects.
     RightLabel,

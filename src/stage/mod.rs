@@ -13,8 +13,10 @@ mod volume;
 
 use crate::options::Method;
 use crate::plan::Plan;
-pub use data::{Array, Data, Extent, Place, Start};
-pub use map::{Map, NO_LABEL, NO_RUNNER_UP};
+pub(crate) use data::{Array, Extent, Place};
+pub use data::{Data, Start};
+pub(crate) use map::NO_RUNNER_UP;
+pub use map::{Map, NO_LABEL};
 pub(crate) use map_set::{MapSet, Optimum};
 pub(crate) use volume::PaddedRows;
 pub use volume::{Volume, volume_shape};
@@ -92,21 +94,21 @@ macro_rules! define {
         finest_rows { $( $finest_row:ident $finest_row_name:ident; )* }
         maps { $( $map:ident $map_name:ident; )* }
     ) => {
-        $( pub mod $level_name; )*
-        $( pub mod $level_row_name; )*
-        $( pub mod $finest_name; )*
-        $( pub mod $finest_row_name; )*
-        $( pub mod $map_name; )*
+        $( pub(crate) mod $level_name; )*
+        $( pub(crate) mod $level_row_name; )*
+        $( pub(crate) mod $finest_name; )*
+        $( pub(crate) mod $finest_row_name; )*
+        $( pub(crate) mod $map_name; )*
 
         /// A stage of the method, with its level if it has one. The module of the same name holds its exact definition, which
         /// the CPU path, the shader and the naive twin in the tests implement independently.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum Stage {
-            $( #[doc = concat!("See [`", stringify!($level_name), "`].")] $level(usize), )*
-            $( #[doc = concat!("See [`", stringify!($level_row_name), "`].")] $level_row(usize), )*
-            $( #[doc = concat!("See [`", stringify!($finest_name), "`].")] $finest, )*
-            $( #[doc = concat!("See [`", stringify!($finest_row_name), "`].")] $finest_row, )*
-            $( #[doc = concat!("See [`", stringify!($map_name), "`].")] $map, )*
+            $( #[doc = concat!("Defined in `", stringify!($level_name), "`.")] $level(usize), )*
+            $( #[doc = concat!("Defined in `", stringify!($level_row_name), "`.")] $level_row(usize), )*
+            $( #[doc = concat!("Defined in `", stringify!($finest_name), "`.")] $finest, )*
+            $( #[doc = concat!("Defined in `", stringify!($finest_row_name), "`.")] $finest_row, )*
+            $( #[doc = concat!("Defined in `", stringify!($map_name), "`.")] $map, )*
         }
 
         impl Stage {

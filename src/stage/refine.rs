@@ -41,13 +41,13 @@
 use super::{Data, Descriptor, Map, maps};
 
 /// Largest distance of the disparity from twice that of the label, in full-size pixels.
-pub const REACH: usize = 4;
+pub(crate) const REACH: usize = 4;
 /// Largest difference of the label of a neighbour.
-pub const NEAR: usize = 1;
+pub(crate) const NEAR: usize = 1;
 /// Largest horizontal distance of a neighbour.
-pub const COLUMNS: usize = 2;
+pub(crate) const COLUMNS: usize = 2;
 /// Offsets (x, y) of the pixels that a census compares: the eight neighbours, and others at distance 2.
-pub const OTHERS: [(isize, isize); 16] = [
+pub(crate) const OTHERS: [(isize, isize); 16] = [
     (-2, -2),
     (0, -2),
     (2, -2),
@@ -66,7 +66,7 @@ pub const OTHERS: [(isize, isize); 16] = [
     (2, 2),
 ];
 /// The census of a masked or outside pixel: every second bit.
-pub const NO_CENSUS: u16 = 0xaaaa;
+pub(crate) const NO_CENSUS: u16 = 0xaaaa;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| [maps(&[Map::Label]), vec![Data::FullLeft, Data::FullRight]].concat(),

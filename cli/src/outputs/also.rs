@@ -46,7 +46,7 @@ pub(super) enum Kind {
 }
 
 /// All outputs, in the order in which they are written.
-pub(super) static ALL: [Also; 20] = [
+pub(super) static ALL: &[Also] = &[
     row(
         "raw",
         "The disparity map before post-processing, in the format of the disparity map",

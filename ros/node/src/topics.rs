@@ -219,7 +219,7 @@ impl Publication {
         self.listeners > 0
     }
 
-    /// Sends a message encoded by [`Encode`](mrfgs_ros::messages::Encode).
+    /// Sends a message encoded by [`Encode`].
     ///
     /// # Errors
     /// If subscribers are too slow, or DDS fails.

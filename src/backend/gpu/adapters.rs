@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// An adapter as listed by `mrfgs devices`.
+#[cfg(not(target_arch = "wasm32"))]
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct DeviceInfo {
@@ -194,7 +195,7 @@ pub fn has_automatic() -> bool {
 }
 
 /// Like `has_automatic`, for browsers.
-pub async fn has_automatic_async() -> bool {
+pub(crate) async fn has_automatic_async() -> bool {
     if !may_have_gpu() {
         return false;
     }

@@ -39,7 +39,8 @@ use crate::program::schedule::split;
 use crate::program::{Program, Run, Sent, SentMessages, joined, sharing, together};
 use crate::stage::Data;
 use crate::threads::prelude::*;
-pub use adapters::{DeviceInfo, has_automatic_async, may_have_gpu};
+pub(crate) use adapters::has_automatic_async;
+pub use adapters::may_have_gpu;
 #[cfg(not(target_arch = "wasm32"))]
 pub use adapters::{devices, has_automatic};
 use buffers::Buffers;

@@ -2,7 +2,7 @@
 //! one cell at a time, wide integers, no padding, no tables, no tricks. Twins share data types and documented
 //! constants with the library, but no function that computes.
 //!
-//! Volumes are `Vec<u32>` in the layout of [`mrfgs::low_level::backend::probe::Volume`]:
+//! Volumes are `Vec<u32>` in the layout of [`mrfgs::low_level::backend::Volume`]:
 //! \[y\]\[x\]\[slot\]\[label\].
 
 pub mod census;
