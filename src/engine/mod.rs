@@ -92,11 +92,7 @@ pub async fn start(
 ///
 /// # Errors
 /// The errors of the backend.
-pub async fn finish(
-    backend: &mut dyn Backend,
-    mut started: MatchRun,
-    pair: &Pair,
-) -> Result<Solution> {
+pub async fn finish(backend: &mut dyn Backend, mut started: MatchRun, pair: &Pair) -> Result<Solution> {
     let quiet = &mut |_: Progress| ControlFlow::Continue(());
     started.advance(backend, pair, quiet, None, None).await?;
     Ok(started.solution())

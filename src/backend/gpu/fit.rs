@@ -1,11 +1,15 @@
 //! Fits programs to a device: the rows of level 0 that it holds, and the commands of each run.
 
-use super::{Command, Gpu, State};
+use super::commands::Pipeline;
+use super::{Command, Gpu, MAX_LOOP_ITERATIONS, State, kernels, other_kernels};
 use crate::error::{Purpose, Result};
 use crate::memory;
 use crate::plan::Plan;
-use crate::program::{Run, Sent, together};
+use crate::program::schedule::split;
+use crate::program::{Program, Run, Sent, Step, together};
 use crate::stage::Stage;
+use crate::threads::prelude::*;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 impl Gpu {
@@ -22,6 +26,37 @@ impl Gpu {
             || bytes <= u64::from(plan.memory) << 20
                 && self.device.memory.is_none_or(|memory| bytes <= memory)
                 && (!self.device.software || memory::check(bytes, Purpose::Match).is_ok())
+    }
+
+    /// Compiles the kernels of `program` in parallel, unless the device holds a match of its plans already. A kernel that is missing is
+    /// compiled on first use, and failures are reported there.
+    pub(super) fn compile(&mut self, program: &Program) {
+        let held: Vec<_> =
+            [&self.state, &self.other].into_iter().flatten().map(|state| &state.plan).collect();
+        if program.frames.iter().all(|frame| held.iter().any(|plan| frame.plan.fits(plan))) {
+            return;
+        }
+        let runs = program.with_plans().filter_map(|(step, plan)| match step {
+            Step::Run(run) => Some((run, plan)),
+            _ => None,
+        });
+        let of_stages = runs.flat_map(|(run, plan)| {
+            let parts = split(run.clone()).into_iter();
+            parts.flat_map(|part| part.stages().collect::<Vec<_>>()).flat_map(|stage| kernels(stage, plan))
+        });
+        let of_uploads = program.frames.iter().flat_map(|frame| other_kernels(&frame.plan));
+        let mut missing = HashMap::new();
+        for kernel in of_stages.chain(of_uploads) {
+            if kernel.loops <= MAX_LOOP_ITERATIONS && !self.pipelines.contains_key(&kernel.shader) {
+                missing.insert(kernel.shader.clone(), kernel);
+            }
+        }
+        let Ok(device) = self.device.inner() else { return };
+        let missing: Vec<_> = missing.into_iter().collect();
+        let compiled =
+            missing.par_iter().map(|(shader, kernel)| (shader.clone(), Pipeline::compiled(device, kernel)));
+        let compiled: Vec<_> = compiled.collect();
+        self.pipelines.extend(compiled);
     }
 
     /// The commands of `run`, recorded on first use. Their messages count as sent from now on.

@@ -38,13 +38,12 @@ use crate::plan::{LevelPlan, Plan};
 use crate::program::schedule::split;
 use crate::program::{Program, Run, Sent, SentMessages, joined, sharing, together};
 use crate::stage::Data;
-use crate::threads::prelude::*;
 pub(crate) use adapters::has_automatic_async;
 pub use adapters::may_have_gpu;
 #[cfg(not(target_arch = "wasm32"))]
 pub use adapters::{devices, has_automatic};
 use buffers::Buffers;
-use commands::{Command, Pipeline, Pipelines, Recorder};
+use commands::{Command, Pipelines, Recorder};
 use convergence::Convergence;
 use device::Device;
 pub use device::FaultInjection;
@@ -135,40 +134,22 @@ impl Gpu {
         }
     }
 
-    /// Compiles the kernels of a match in parallel. Those that a stage takes in special cases are compiled on first use.
-    fn compile(&mut self, plan: &Plan) -> Result<()> {
-        let mut missing = HashMap::new();
-        let stages = Stage::all(plan).into_iter().flat_map(|stage| kernels(stage, plan));
-        for kernel in stages.chain(other_kernels(plan)) {
-            if kernel.loops <= MAX_LOOP_ITERATIONS && !self.pipelines.contains_key(&kernel.shader) {
-                missing.insert(kernel.shader.clone(), kernel);
-            }
-        }
-        let device = self.device.inner()?;
-        let missing: Vec<_> = missing.into_iter().collect();
-        let compiled =
-            missing.par_iter().map(|(shader, kernel)| (shader.clone(), Pipeline::compiled(device, kernel)));
-        let compiled: Vec<_> = compiled.collect();
-        self.pipelines.extend(compiled);
-        self.device.check()
-    }
-
-    /// The commands of all stages at single levels, and of joined levels that share buffers.
-    fn all_commands(&mut self, plan: &Plan, buffers: &mut Buffers) -> Result<Commands> {
+    /// The commands of the message stages, if message passing may settle: the workgroup counts of all of them
+    /// must be known before [`Stage::Change`] is recorded, which zeroes them. All others are recorded on first use.
+    fn commands_that_end(&mut self, plan: &Plan, buffers: &mut Buffers) -> Result<Commands> {
         let mut commands = HashMap::new();
         let mut endings = Vec::new();
+        let ends = |stage: &Stage| stage.passes_messages() && plan.settled_change().is_some();
         let runs_whole = |stage: &Stage| plan.holds_all_rows() || !stage.needs_level_0(plan);
-        for stage in Stage::all(plan).into_iter().filter(|s| *s != Stage::Change).filter(runs_whole) {
-            let ends = stage.passes_messages() && plan.settled_change().is_some();
+        for stage in Stage::all(plan).into_iter().filter(ends).filter(runs_whole) {
             let shares = stage.finest_level(plan) >= buffers.finest_shared && record_levels(stage).is_some();
             let most = if shares { plan.levels.len() - stage.level().unwrap_or(0) } else { 1 };
             for levels in 1..=most {
                 let run = Run { levels, ..stage.into() };
-                let recorded = self.recorded(&run, &[], plan, buffers, ends.then_some(&mut endings))?;
+                let recorded = self.recorded(&run, &[], plan, buffers, Some(&mut endings))?;
                 commands.insert((run, Vec::new()), recorded);
             }
         }
-        // `Change` zeroes the indirect workgroup counts, which must be known before it is recorded.
         buffers.end_when_settled(&mut self.device, plan, &endings)?;
         Ok(commands)
     }
@@ -231,8 +212,7 @@ impl Gpu {
         }
         self.device.free_staging();
         let mut buffers = Buffers::new(&mut self.device, plan)?;
-        self.compile(plan)?;
-        let commands = self.all_commands(plan, &mut buffers)?;
+        let commands = self.commands_that_end(plan, &mut buffers)?;
         let upload = HashMap::new();
         let (pitch, rows) = uploaded_rows(plan, &buffers);
         let words = pitch as usize * rows;
@@ -421,13 +401,15 @@ impl Backend for Gpu {
     }
 
     fn fit(&mut self, program: Program) -> Program {
-        program.each_frame(|plan, steps| {
+        let program = program.each_frame(|plan, steps| {
             let steps = if self.holds_all_rows(plan) { steps } else { together::pass(plan, steps) };
             let steps = sharing::pass(plan, steps);
             // Levels are timed separately, so they are not joined.
             let shared = Buffers::finest_shared(&self.device, plan);
             if self.timer.is_none() { joined::join(plan, shared, steps) } else { steps }
-        })
+        });
+        self.compile(&program);
+        program
     }
 
     fn perform(&mut self, run: &Run) -> Result<()> {
