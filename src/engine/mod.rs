@@ -219,6 +219,10 @@ impl MatchRun {
                 let (pair, conditioning) = front::condition(original, self.plan(), watch)?;
                 (self.pair, self.solution.conditioning) = (Some(pair), conditioning);
             }
+            Step::Correct(known) => {
+                self.pair = Some(front::correct(original, self.plan(), &known, watch)?);
+                self.solution.conditioning = known;
+            }
             Step::Double => {
                 let conditioning = &self.solution.conditioning;
                 self.pair = Some(watch.host("double_size", || front::doubled(original, conditioning))?);
