@@ -32,7 +32,9 @@ pub(super) fn corners(
     // On a tie, the earlier one in raster order wins.
     let is_peak = |x: usize, y: usize| {
         let value = values[(x, y)];
+        // Most pixels are below one beside them.
         value > 0.0
+            && [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)].iter().all(|beside| values[*beside] <= value)
             && (y - PEAK_RADIUS..=y + PEAK_RADIUS).all(|v| {
                 (x - PEAK_RADIUS..=x + PEAK_RADIUS)
                     .all(|u| value.total_cmp(&values[(u, v)]).then((v, u).cmp(&(y, x))).is_ge())
