@@ -62,7 +62,8 @@ impl<'a> Matching<'a> {
         let third = args.also.third()?;
         let method = args.also.made_by(args.method.method()?)?;
         let sigma = Sigma::for_method(&method);
-        let measure_every = method.front.measure_every;
+        // A correction of the calibration also changes the faults that are left in the frames.
+        let measure_every = if args.recalibrate { 1 } else { method.front.measure_every };
         if args.are_rectified(&cameras) {
             args.rectification.options_if(false)?;
         }

@@ -177,7 +177,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         args.maps.also.check(rectify)?;
     }
     let third = args.maps.also.third()?;
-    let method = args.maps.also.made_by(args.method.method()?)?;
+    let mut method = args.maps.also.made_by(args.method.method()?)?;
+    if args.recalibrate {
+        // A correction also changes the faults that are left in the frames.
+        method.front.measure_every = 1;
+    }
     let rectifying = args.rectification.options_if(rectify)?;
     let remarks = recorded.as_ref().map(Recorded::remarks);
     let mut frames = match recorded {
