@@ -4,6 +4,7 @@
 //! device, whose driver may compute on the processor.
 
 #[path = "../cli/src/commands/bench/synthetic.rs"]
+#[allow(dead_code, reason = "the program has scenes of its own")]
 mod synthetic;
 
 use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};

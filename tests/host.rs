@@ -2,6 +2,7 @@
 //! nothing, so that no driver is needed.
 
 #[path = "../cli/src/commands/bench/synthetic.rs"]
+#[allow(dead_code, reason = "the program has scenes of its own")]
 mod synthetic;
 
 use mrfgs::low_level::backend::Traffic;

@@ -7,11 +7,11 @@ mod common;
 
 use common::devices::open as device;
 use common::random::{self, Random};
-use mrfgs::image::Pair;
+use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::low_level::backend::gpu::FaultInjection;
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Execution, Method};
-use mrfgs::{Error, Matched, Matcher, Result};
+use mrfgs::{Conditioning, Error, Matched, Matcher, Result};
 use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,6 +32,8 @@ fn pairs() -> Vec<(Pair, DisparityRange)> {
 fn method() -> Method {
     let mut method = Method::default();
     method.set("memory", "24").unwrap();
+    // The pairs show different scenes.
+    method.set("measure-every", "1").unwrap();
     method
 }
 
@@ -120,6 +122,115 @@ fn a_sequence_equals_its_single_pairs() {
     let (result, found, _) = all(&mut matcher, pairs(), usize::MAX);
     result.unwrap();
     assert_same(found, &expected);
+}
+
+/// Five frames of `one` and `other`, in turns but for the last.
+fn in_turns(one: &Pair, other: &Pair) -> Vec<(Pair, DisparityRange)> {
+    let range = DisparityRange::new(0, 31).unwrap();
+    [one, other, one, other, one].map(|pair| (pair.clone(), range)).into()
+}
+
+fn scene(name: &str) -> Pair {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name);
+    Pair::open(folder.join("im0.png"), folder.join("im1.png")).unwrap()
+}
+
+/// Frames whose right view lies too low, and in every other one a row lower still.
+fn slipping() -> Vec<(Pair, DisparityRange)> {
+    let low = scene("rows");
+    let right = low.right();
+    let lowered = |x: usize, y: usize| right.pixels[(x, y.saturating_sub(1))];
+    let pixels = Plane::from_fn(right.width(), right.height(), lowered);
+    let lower = Pair::new(low.left().clone(), Image { pixels, masked: right.masked.clone() }).unwrap();
+    in_turns(&low, &lower)
+}
+
+/// Frames of which one view is out of focus, by turns the left and the right one.
+fn unfocused() -> Vec<(Pair, DisparityRange)> {
+    let sharp = scene("slanted");
+    let right = sharp.right();
+    let (width, height) = sharp.size();
+    let pixels = Plane::from_fn(width, height, |x, y| {
+        let clamped = |v: usize, most: usize| v.saturating_sub(5).min(most - 1);
+        let around =
+            (y..y + 11).flat_map(|v| (x..x + 11).map(move |u| (clamped(u, width), clamped(v, height))));
+        let mut sums = [0; 4];
+        for at in around {
+            sums.iter_mut().zip(right.pixels[at]).for_each(|(sum, v)| *sum += u32::from(v));
+        }
+        sums.map(|sum| (sum / 121) as u16)
+    });
+    let one = Pair::new(sharp.left().clone(), Image { pixels, masked: right.masked.clone() }).unwrap();
+    in_turns(&one, &one.mirrored())
+}
+
+/// What is corrected is measured on the first frame of each group alone, whatever runs the match.
+#[test]
+fn frames_are_corrected_like_the_measured_one() {
+    for (preset, frames) in [("default", slipping()), ("fast", unfocused())] {
+        let mut every_third = Method::preset(preset).unwrap();
+        every_third.set("measure-every", "3").unwrap();
+        let mut each = every_third.clone();
+        each.set("measure-every", "1").unwrap();
+        let mut cpu = on_cpu();
+        let alone: Vec<Matched> = frames
+            .iter()
+            .map(|(pair, range)| cpu.job(pair, *range).method(&every_third).run().unwrap())
+            .collect();
+        let faults = [0, 1].map(|i| alone[i].conditioning);
+        let none = Conditioning::default();
+        assert!(!faults.contains(&none) && faults[0] != faults[1], "{preset}: {faults:?}");
+        let expected: Vec<Matched> = frames
+            .iter()
+            .enumerate()
+            .map(|(i, (pair, range))| {
+                let known = alone[i / 3 * 3].conditioning;
+                cpu.job(pair, *range).method(&every_third).conditioning(known).run().unwrap()
+            })
+            .collect();
+        // Control: a frame by itself is corrected otherwise.
+        assert!(expected[1].maps != alone[1].maps && expected[3].maps == alone[3].maps, "{preset}");
+        let same = |matcher: &mut Matcher| {
+            for (method, expected) in [(&every_third, &expected), (&each, &alone)] {
+                matcher.set_method(method.clone());
+                let mut found = Vec::new();
+                let taken = matcher.run_all(frames.clone(), |matched| {
+                    found.push(matched);
+                    ControlFlow::Continue(())
+                });
+                taken.unwrap();
+                assert_eq!(found.len(), expected.len());
+                for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
+                    assert_eq!(found.conditioning, expected.conditioning, "{preset}: frame {i}");
+                    assert!(found.maps == expected.maps, "{preset}: frame {i} on {}", found.ran_on);
+                }
+            }
+        };
+        for threads in [1, 2] {
+            same(&mut Matcher::builder().device("cpu").threads(threads).build().unwrap());
+        }
+        same(&mut Matcher::builder().device("cpu").timings(true).build().unwrap());
+        let Some(gpu) = device(FaultInjection::default()) else { continue };
+        same(&mut Matcher::on(Ok(gpu), false, &Execution::default()).unwrap());
+    }
+}
+
+/// A frame of another size or range is measured by itself.
+#[test]
+fn other_frames_are_measured_again() {
+    let mut frames: Vec<_> = slipping().into_iter().take(2).collect();
+    frames[1].1.max += 2;
+    let mut matcher = on_cpu();
+    let alone: Vec<_> =
+        frames.iter().map(|(pair, range)| matcher.run(pair, *range).unwrap().conditioning).collect();
+    let mut found = Vec::new();
+    let taken = matcher.run_all(frames, |matched| {
+        found.push(matched.conditioning);
+        ControlFlow::Continue(())
+    });
+    taken.unwrap();
+    assert_eq!(found, alone);
+    assert_ne!(alone[0], alone[1]);
 }
 
 /// Waits for a message, with a time limit.

@@ -134,7 +134,8 @@ class Matcher:
         warn: bool = True,
     ) -> MatchedSequence:
         """Matches pair after pair, and returns an iterator over their results, in order. At most three pairs are consumed ahead of the
-        results; an exception from `pairs` comes after the results of earlier pairs."""
+        results; an exception from `pairs` comes after the results of earlier pairs. The pairs are frames of one pair of cameras, unless
+        options={"measure-every": 1}."""
 
 @final
 class MatchedSequence(Iterator[Matched]):

@@ -133,6 +133,10 @@ impl PyMatcher {
     ///     rights). Up to three pairs are in flight, so a result appears after two more pairs have been consumed. The arrays of a pair may
     ///     be reused for the next one.
     ///
+    /// The pairs are frames of one pair of cameras. The automatic range and the warnings come from the first pair, and from the first one of
+    /// another size. What is corrected in a pair (rows, focus, noise) is measured on every 30th. For pairs of different cameras or scenes
+    /// give options={"measure-every": 1}: then each is treated as by `match`, but not matched again over a wider range.
+    ///
     /// The other arguments are those of `match`, for all pairs; use masked arrays to ignore pixels. Pairs are consumed, and exceptions
     /// raised, in the thread that asks for results. An exception from `pairs`, or about an invalid pair, comes after the results of earlier
     /// pairs; messages number pairs from 0. Ctrl-C ends the sequence, as does `close()` of the iterator, which is automatic once nothing

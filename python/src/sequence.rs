@@ -67,6 +67,8 @@ struct State {
     failure: Option<PyErr>,
     /// Pairs consumed, and results returned.
     counts: [usize; 2],
+    /// The size of the last pair, and the range that it was searched over.
+    last: Option<((usize, usize), DisparityRange)>,
     /// Exists from the first pair to the last result.
     worker: Option<Own<Worker>>,
     ended: bool,
@@ -75,8 +77,16 @@ struct State {
 impl PyMatchedSequence {
     pub(crate) fn new(shared: Shared, settings: Settings, pairs: Bound<PyIterator>) -> Self {
         let pairs = Some(pairs.unbind());
-        let state =
-            State { shared, settings, pairs, failure: None, counts: [0; 2], worker: None, ended: false };
+        let state = State {
+            shared,
+            settings,
+            pairs,
+            failure: None,
+            counts: [0; 2],
+            last: None,
+            worker: None,
+            ended: false,
+        };
         Self(Mutex::new(state))
     }
 }
@@ -180,9 +190,10 @@ impl State {
         self.job(&item).map(Some).map_err(|error| numbered(py, self.counts[0], error))
     }
 
-    fn job(&self, item: &Bound<PyAny>) -> PyResult<(Pair, DisparityRange)> {
+    /// Finds the range and checks for likely faults, unless the last pair of the same cameras has shown both.
+    fn job(&mut self, item: &Bound<PyAny>) -> PyResult<(Pair, DisparityRange)> {
         let py = item.py();
-        let Settings { range: given, min_disparity, no_data, warn, .. } = self.settings;
+        let Settings { ref method, range: given, min_disparity, no_data, warn } = self.settings;
         let one = |i: usize| item.get_item(i).ok().filter(|_| item.len().is_ok_and(|count| count == 2));
         let Some((left, right)) = one(0).zip(one(1)) else {
             return Err(PyTypeError::new_err("give two arrays, left and right"));
@@ -190,11 +201,16 @@ impl State {
         let [left, right] = Image::both(&left, &right)?;
         let pair = arrays::pair(&left, &right, None, no_data)?;
         let matcher = &self.shared.matcher;
+        let is_alike = |(size, _): &((usize, usize), DisparityRange)| *size == pair.size();
+        if let Some((_, range)) = self.last.filter(is_alike).filter(|_| method.front.measure_every > 1) {
+            return Ok((pair, range));
+        }
         let found = range::searched(py, matcher, &pair, given, min_disparity)?;
         if warn {
             let checked = py.detach(|| matcher.share(&pair, || check::warnings(&pair, given)));
             exceptions::warn(py, checked.map_err(exception)?)?;
         }
+        self.last = Some((pair.size(), found));
         Ok((pair, found))
     }
 

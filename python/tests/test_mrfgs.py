@@ -1468,7 +1468,7 @@ class Sequences(Folder):
             self.assertTrue(np.array_equal(one.disparity, self.matcher.match(
                 *images, 15, min_disparity=-2, method="fast", options={"fill": "none"}, no_data=7).disparity))
         large = [pair(200, 300, seed=seed) for seed in (1, 2)]
-        for one, images in zip(self.matcher.match_all(large), large):
+        for one, images in zip(self.matcher.match_all(large, options={"measure-every": 1}), large):
             self.assertEqual(one.max_disparity, mrfgs.match(*images, device="cpu").max_disparity)
 
     def test_rectified_on_the_way(self):
@@ -1719,6 +1719,17 @@ class Sequences(Folder):
         said = [str(w.message) for w in caught]
         self.assertTrue(all(w.category is mrfgs.MatchWarning and w.filename == __file__ for w in caught))
         self.assertTrue(any("swapped" in text for text in said) and any("raise max_disparity" in text for text in said), said)
+        # Faults of the cameras are told once, and again for another size or if every pair is measured.
+        small = left[:150], right[:150]
+        for pairs, options, count in (
+            ([(right, left)] * 3, {}, 1),
+            ([(right, left), small[::-1], small[::-1]], {}, 2),
+            ([(right, left)] * 3, {"measure-every": 1}, 3),
+        ):
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                list(self.matcher.match_all(pairs, 9, options=options))
+            self.assertEqual(sum("swapped" in str(w.message) for w in caught), count)
         with warnings.catch_warnings():
             warnings.simplefilter("error", mrfgs.MatchWarning)
             with self.assertRaises(mrfgs.MatchWarning):

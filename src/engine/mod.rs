@@ -178,6 +178,7 @@ impl MatchRun {
         let plan = &program.frames[running.frame].plan;
         match step {
             Step::Condition => source.condition(original, plan, watch)?,
+            Step::Correct(known) => source.correct(original, plan, known, watch)?,
             Step::Double => {
                 source.double(original, watch)?;
                 gathering.put_aside();

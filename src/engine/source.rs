@@ -29,6 +29,19 @@ impl Source {
         Ok(())
     }
 
+    /// Makes `known` corrections to the `original` pair.
+    pub(super) fn correct(
+        &mut self,
+        original: &Pair,
+        plan: &Plan,
+        known: Conditioning,
+        watch: &mut Watch<'_>,
+    ) -> Result<()> {
+        let pair = front::correct(original, plan, &known, watch)?;
+        (self.pair, self.conditioning) = (Some(pair), known);
+        Ok(())
+    }
+
     /// Replaces the pair by the `original` one at twice its size.
     pub(super) fn double(&mut self, original: &Pair, watch: &mut Watch<'_>) -> Result<()> {
         let doubled = watch.host("double_size", || front::doubled(original, &self.conditioning))?;

@@ -39,15 +39,19 @@ use crate::plan::Plan;
 use crate::watch::Watch;
 use conditioning::Conditioning;
 
+/// `pair` at the size at which `plan` matches it.
+fn at_size(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<Pair> {
+    memory::check(plan.halving_bytes() + 3 * plan.conditioning_bytes(), Purpose::Match)?;
+    if plan.full.is_some() { watch.host("half_size", || Ok(pair.halved())) } else { Ok(pair.clone()) }
+}
+
 /// The pair that is matched by `plan` in the place of `pair`, and what was corrected in that. Where the pair is matched at half its
 /// size, its faults are measured there.
 ///
 /// # Errors
 /// [`Error::Memory`] when the machine cannot hold it, and [`Error::Interrupted`] when the observer breaks.
 pub(crate) fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(Pair, Conditioning)> {
-    memory::check(plan.halving_bytes() + 3 * plan.conditioning_bytes(), Purpose::Match)?;
-    let halved = plan.full.is_some();
-    let pair = if halved { watch.host("half_size", || Ok(pair.halved()))? } else { pair.clone() };
+    let pair = at_size(pair, plan, watch)?;
     if plan.conditioning_bytes() == 0 {
         return Ok((pair, Conditioning::default()));
     }
@@ -58,6 +62,21 @@ pub(crate) fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(
         };
         let found = found.doubled();
         Ok((conditioned.with_full(Some(found.apply(full))), found))
+    })
+}
+
+/// Like [`condition`], with corrections that are known, for `pair` at its own size.
+///
+/// # Errors
+/// The errors of [`condition`].
+pub(crate) fn correct(pair: &Pair, plan: &Plan, known: &Conditioning, watch: &mut Watch) -> Result<Pair> {
+    let pair = at_size(pair, plan, watch)?;
+    if *known == Conditioning::default() {
+        return Ok(pair);
+    }
+    watch.host("conditioning", || {
+        let Some(full) = pair.full() else { return Ok(known.apply(&pair)) };
+        Ok(known.halved().apply(&pair).with_full(Some(known.apply(full))))
     })
 }
 

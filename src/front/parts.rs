@@ -176,7 +176,8 @@ fn contrast(image: &Image, masked: &Plane<bool>) -> Option<f64> {
 pub(super) fn blurred(left: &Image, right: &Image) -> Option<(usize, Part)> {
     let (width, height) = left.pixels.size();
     // Pixels masked in one view do not count in the other either.
-    let masked = Plane::from_fn(width, height, |x, y| left.masked[(x, y)] || right.masked[(x, y)]);
+    let masks = left.masked.data().iter().zip(right.masked.data());
+    let masked = Plane::new(width, height, masks.map(|(left, right)| left | right).collect());
     let contrasts = [contrast(left, &masked)?, contrast(right, &masked)?];
     let detail = |image: &Image, i: usize| {
         // Scale the rounding to the same share of the contrast in both views.

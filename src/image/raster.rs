@@ -240,6 +240,9 @@ impl<'a> Raster<'a> {
     pub(super) fn masked(&self) -> Plane<bool> {
         let n = self.channels;
         let colours = self.colours();
+        if n == colours && !self.samples.is_float() && self.no_data.is_none() {
+            return Plane::filled(self.width, self.height, false);
+        }
         let mut plane = of_any!(&self.samples, v => {
             let masked = v.chunks_exact(n).map(|p| {
                 n > colours && p[colours].double() == 0.0
@@ -443,15 +446,27 @@ impl Scale {
 
 /// Pixels from samples of `n` channels; masked pixels become zero.
 fn pixels<S: Copy>(samples: &[S], n: usize, masked: &Plane<bool>, level: impl Fn(S) -> u16) -> Plane<Pixel> {
-    let pixel = |(p, masked): (&[S], &bool)| match p {
-        _ if *masked => [0; 4],
-        [r, g, b, ..] => {
-            let [r, g, b] = [*r, *g, *b].map(&level);
-            [r, g, b, grey(r, g, b)]
-        }
-        [v, ..] => [level(*v); 4],
-        [] => [0; 4],
+    let of_grey = |v: S| [level(v); 4];
+    let of_colour = |colour: [S; 3]| {
+        let [r, g, b] = colour.map(&level);
+        [r, g, b, grey(r, g, b)]
     };
-    let values = samples.chunks_exact(n).zip(masked.data()).map(pixel).collect();
+    // A known number of channels gives a faster loop.
+    match n {
+        1 => pixels_of(samples, masked, |[v]| of_grey(v)),
+        2 => pixels_of(samples, masked, |[v, _]| of_grey(v)),
+        3 => pixels_of(samples, masked, of_colour),
+        _ => pixels_of(samples, masked, |[r, g, b, _]| of_colour([r, g, b])),
+    }
+}
+
+/// Pixels from samples of `N` channels.
+fn pixels_of<S: Copy, const N: usize>(
+    samples: &[S],
+    masked: &Plane<bool>,
+    pixel: impl Fn([S; N]) -> Pixel,
+) -> Plane<Pixel> {
+    let samples = samples.as_chunks::<N>().0.iter().zip(masked.data());
+    let values = samples.map(|(samples, masked)| if *masked { [0; 4] } else { pixel(*samples) }).collect();
     Plane::new(masked.width(), masked.height(), values)
 }

@@ -1,10 +1,11 @@
 //! A single match with all its options.
 
 use super::search::Search;
-use super::{Matched, Matcher};
+use super::{Matched, Matcher, Request};
 use crate::engine::Inspection;
 use crate::error::{Error, Result};
 use crate::front::check;
+use crate::front::conditioning::Conditioning;
 use crate::image::{Pair, Rect};
 use crate::options::{DisparityRange, Method};
 #[cfg(doc)]
@@ -45,6 +46,7 @@ pub struct Job<'a> {
     found: bool,
     method: Option<&'a Method>,
     region: Option<Rect>,
+    known: Option<Conditioning>,
     cancel: Option<&'a AtomicBool>,
     listener: Option<Listener<'a>>,
     inspect: Option<Inspect<'a>>,
@@ -76,6 +78,7 @@ impl<'a> Job<'a> {
             found: S::AUTOMATIC,
             method: None,
             region: None,
+            known: None,
             cancel: None,
             listener: None,
             inspect: None,
@@ -91,6 +94,12 @@ impl<'a> Job<'a> {
     /// part; the maps have its size. See [`Region`].
     pub fn region(self, part: Rect) -> Self {
         Self { region: Some(part), ..self }
+    }
+
+    /// Corrects the pair as an earlier frame of the same cameras, whose [`Matched::conditioning`] this is, instead of measuring the
+    /// corrections. [`Matcher::run_all`](Matcher::run_all_async) does that by itself.
+    pub fn conditioning(self, known: Conditioning) -> Self {
+        Self { known: Some(known), ..self }
     }
 
     /// `listener` receives the progress as each stage begins. If the pair is matched [again](Search::AUTOMATIC), it
@@ -128,7 +137,8 @@ impl<'a> Job<'a> {
     /// # Errors
     /// The errors of `run`.
     pub async fn run_async(self) -> Result<Matched> {
-        let Self { matcher, pair, find, found, method, region, cancel, mut listener, mut inspect } = self;
+        let Self { matcher, pair, find, found, method, region, known, cancel, mut listener, mut inspect } =
+            self;
         let (width, height) = pair.size();
         let range = matcher.threads.run(width * height, async || find(pair)).await??;
         let own = matcher.method.clone();
@@ -142,10 +152,12 @@ impl<'a> Job<'a> {
         // An inspector sees a single match.
         let once = !found || inspector.is_some();
         let region = region.as_ref();
-        let matched = matcher.solve_part(pair, region, range, method, &mut observer, inspector).await?;
+        let request = Request { range, method, known };
+        let matched = matcher.solve_part(pair, region, request, &mut observer, inspector).await?;
         let matched = Matched { range_found: found, ..matched };
         let Some(wider) = check::wider(&matched.maps, range).filter(|_| !once) else { return Ok(matched) };
-        match matcher.solve_part(pair, region, wider, method, &mut observer, None).await {
+        let again = Request { range: wider, ..request };
+        match matcher.solve_part(pair, region, again, &mut observer, None).await {
             Ok(again) if check::goes_beyond(&again.maps, range) => {
                 Ok(Matched { range_found: found, ..again })
             }

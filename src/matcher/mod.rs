@@ -1,6 +1,7 @@
 //! The entry point: matches pairs. It opens a backend, checks it, and falls back to the CPU path if allowed.
 
 mod check;
+mod corrections;
 mod job;
 mod matched;
 pub mod on_device;
@@ -16,6 +17,7 @@ use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{self, FaultInjection, Gpu};
 use crate::engine::{self, Inspector};
 use crate::error::{BudgetError, Error, Result};
+use crate::front::conditioning::Conditioning;
 use crate::image::{Pair, Rect};
 use crate::options::{DeviceChoice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
@@ -121,6 +123,15 @@ pub struct Matcher {
     timings: bool,
 }
 
+/// How a pair is matched.
+#[derive(Clone, Copy)]
+struct Request<'a> {
+    range: DisparityRange,
+    method: &'a Method,
+    /// Corrections that are not measured on the pair itself.
+    known: Option<Conditioning>,
+}
+
 impl Matcher {
     /// A matcher of the preset `default`, on a GPU if there is one, else on the CPU path.
     ///
@@ -175,15 +186,14 @@ impl Matcher {
         &mut self,
         pair: &Pair,
         part: Option<&Rect>,
-        range: DisparityRange,
-        method: &Method,
+        request: Request<'_>,
         observer: Observer<'_>,
         inspector: Option<Inspector<'_>>,
     ) -> Result<Matched> {
-        let Some(part) = part else { return self.solve(pair, range, method, observer, inspector).await };
-        let region = Region::new(part.clone(), pair.size(), range)?;
+        let Some(part) = part else { return self.solve(pair, request, observer, inspector).await };
+        let region = Region::new(part.clone(), pair.size(), request.range)?;
         let window = region.window_of(pair);
-        let matched = self.solve(&window, range, method, observer, inspector).await?;
+        let matched = self.solve(&window, request, observer, inspector).await?;
         Ok(Matched { maps: region.maps_of(&matched.maps), ..matched })
     }
 
@@ -191,11 +201,11 @@ impl Matcher {
     async fn solve(
         &mut self,
         pair: &Pair,
-        range: DisparityRange,
-        method: &Method,
+        request: Request<'_>,
         observer: Observer<'_>,
         mut inspector: Option<Inspector<'_>>,
     ) -> Result<Matched> {
+        let Request { range, method, known } = request;
         let (width, height) = pair.size();
         let plan = Plan::new(width, height, range, method)?;
         let tiles = Tiles::new(&plan)?;
@@ -209,7 +219,7 @@ impl Matcher {
             let served = async || {
                 check(device, &plan.method, checked).await?;
                 let inspector = inspector.as_mut().map(|inspector| &mut **inspector as _);
-                timed(device, *timings, &tiles, pair, &mut *observer, inspector).await
+                timed(device, *timings, &tiles, (pair, known), &mut *observer, inspector).await
             };
             match threads.run(width * height, served).await? {
                 Err(e) => note = Some(self.without_device(e)?),
@@ -219,7 +229,7 @@ impl Matcher {
         let Self { threads, cpus, given_up, timings, .. } = self;
         let note = note.or_else(|| given_up.clone());
         let mut cpu = cpus.pop().unwrap_or_default();
-        let served = async || timed(&mut cpu, *timings, &tiles, pair, observer, inspector).await;
+        let served = async || timed(&mut cpu, *timings, &tiles, (pair, known), observer, inspector).await;
         let matched = threads.run(width * height, served).await;
         cpus.push(cpu);
         let matched = matched??;
@@ -243,16 +253,17 @@ impl Matcher {
     }
 }
 
+/// Matches a pair, with its corrections if they are known.
 async fn timed(
     backend: &mut dyn Backend,
     timings: bool,
     tiles: &Tiles,
-    pair: &Pair,
+    (pair, known): (&Pair, Option<Conditioning>),
     observer: Observer<'_>,
     inspector: Option<Inspector<'_>>,
 ) -> Result<Matched> {
     backend.keep_time(timings)?;
-    let program = Program::new(tiles)?;
+    let program = Program::new(tiles)?.corrected(known);
     let solution = engine::solve(backend, &program, pair, observer, inspector).await?;
     let timings = if timings { summed(&solution, &backend.times().await?) } else { Vec::new() };
     Ok(Matched::new(backend, tiles, solution, timings))

@@ -1,10 +1,12 @@
 //! Sequences of pairs: a device always has work queued, and the CPU path matches several pairs in parallel.
 
 use super::check::check;
-use super::{Matched, Matcher};
+use super::corrections::Corrections;
+use super::{Matched, Matcher, Request};
 use crate::backend::Backend;
 use crate::engine::{self, MatchRun};
 use crate::error::Result;
+use crate::front::conditioning::Conditioning;
 use crate::image::Pair;
 use crate::options::{DisparityRange, Method};
 use crate::plan::Plan;
@@ -21,6 +23,10 @@ impl Matcher {
     /// previous one are downloaded, unless a pair is cut into tiles or matched at twice its size. The CPU path
     /// matches as many pairs in parallel as it has threads, if they fit in the memory of the method and of the
     /// machine; `take` runs on its own thread there. With per-stage timing, pairs are matched one at a time.
+    ///
+    /// The pairs are frames of one rig: what conditioning corrects is measured on every so many frames
+    /// ([`measure_every`](crate::options::FrontOptions::measure_every)), and the others are corrected alike. So the
+    /// maps depend on the order of the pairs, but not on the device.
     ///
     /// # Errors
     /// The errors of [`Job::run`](super::Job::run), after the results of all earlier pairs.
@@ -69,19 +75,21 @@ impl Matcher {
         let method = &self.method.clone();
         let observer: Observer = &mut |_| goes_on([cancel]);
         let mut last: Option<Flight> = None;
+        let mut corrections = Corrections::default();
         // The device may be lost during the sequence.
         while self.gpu.is_some() || self.timings || cfg!(target_arch = "wasm32") {
             let Some((pair, range)) = pairs.next() else { break };
-            let started = self.start(&pair, range, method, &mut *observer).await;
+            let started = self.start(&pair, range, method, &mut corrections, &mut *observer).await;
             if let Some(last) = last.take()
                 && take(self.land(last, method, &mut *observer).await?).is_break()
             {
                 return Ok(());
             }
             match started? {
-                Some((tiles, started)) => last = Some(Flight { pair, range, tiles, started }),
-                None => {
-                    if take(self.solve(&pair, range, method, &mut *observer, None).await?).is_break() {
+                (known, Some((tiles, started))) => last = Some(Flight { pair, range, known, tiles, started }),
+                (known, None) => {
+                    let request = Request { range, method, known };
+                    if take(self.solve(&pair, request, &mut *observer, None).await?).is_break() {
                         return Ok(());
                     }
                 }
@@ -93,25 +101,31 @@ impl Matcher {
             return Ok(());
         }
         #[cfg(not(target_arch = "wasm32"))]
-        super::side_by_side::side_by_side(self, pairs, cancel, take)?;
+        super::side_by_side::side_by_side(self, pairs, corrections, cancel, take)?;
         Ok(())
     }
 
-    /// Starts a match on the device, if it needs no host steps in between.
+    /// The corrections of the pair, if they are known, and its match, which is started on the device if it needs no host steps in
+    /// between.
     async fn start(
         &mut self,
         pair: &Pair,
         range: DisparityRange,
         method: &Method,
+        corrections: &mut Corrections,
         observer: Observer<'_>,
-    ) -> Result<Option<(Tiles, MatchRun)>> {
-        let Self { threads, gpu: Some(device), checked, timings: false, .. } = self else { return Ok(None) };
+    ) -> Result<(Option<Conditioning>, Option<(Tiles, MatchRun)>)> {
         let (width, height) = pair.size();
         let plan = Plan::new(width, height, range, method)?;
         let tiles = Tiles::new(&plan)?;
-        let program = Program::new(&tiles)?;
+        let measured = async || corrections.of(pair, &plan, &mut *observer);
+        let known = self.threads.run(width * height, measured).await??;
+        let Self { threads, gpu: Some(device), checked, timings: false, .. } = self else {
+            return Ok((known, None));
+        };
+        let program = Program::new(&tiles)?.corrected(known);
         if !program.waits_once() {
-            return Ok(None);
+            return Ok((known, None));
         }
         let started = async || {
             check(device, &plan.method, checked).await?;
@@ -119,14 +133,14 @@ impl Matcher {
             engine::start(device, &program, pair, observer).await
         };
         match threads.run(width * height, started).await? {
-            Ok(started) => Ok(Some((tiles, started))),
-            Err(e) => self.without_device(e).map(|_| None),
+            Ok(started) => Ok((known, Some((tiles, started)))),
+            Err(e) => self.without_device(e).map(|_| (known, None)),
         }
     }
 
     /// Completes a match that was started on the device; if the device has failed, matches again without it.
     async fn land(&mut self, flight: Flight, method: &Method, observer: Observer<'_>) -> Result<Matched> {
-        let Flight { pair, range, tiles, started } = flight;
+        let Flight { pair, range, known, tiles, started } = flight;
         let (width, height) = pair.size();
         if let Some(device) = &mut self.gpu {
             let finished = async || engine::finish(device, started, &pair).await;
@@ -135,7 +149,7 @@ impl Matcher {
                 Err(e) => self.without_device(e)?,
             };
         }
-        self.solve(&pair, range, method, observer, None).await
+        self.solve(&pair, Request { range, method, known }, observer, None).await
     }
 }
 
@@ -143,6 +157,7 @@ impl Matcher {
 struct Flight {
     pair: Pair,
     range: DisparityRange,
+    known: Option<Conditioning>,
     tiles: Tiles,
     started: MatchRun,
 }

@@ -3,8 +3,10 @@
 //! Some steps of a match are sequential, and others are too short to parallelize if images are small. So each
 //! thread takes its own pair while enough of them wait, and otherwise helps with the rows of another.
 
+use super::corrections::Corrections;
 use super::{Matched, Matcher, timed};
 use crate::error::{ExecutionError, Purpose, Result};
+use crate::front::conditioning::Conditioning;
 use crate::image::Pair;
 use crate::memory;
 use crate::options::{DisparityRange, Method};
@@ -25,6 +27,7 @@ use std::thread;
 pub(super) fn side_by_side(
     matcher: &mut Matcher,
     pairs: impl Iterator<Item = (Pair, DisparityRange)>,
+    mut corrections: Corrections,
     cancel: &AtomicBool,
     take: impl FnMut(Matched) -> ControlFlow<()> + Send,
 ) -> Result<()> {
@@ -33,7 +36,7 @@ pub(super) fn side_by_side(
     let pool = threads.pool(usize::MAX)?;
     let room = Room::new(pool.current_num_threads(), u64::from(method.tiles.memory) << 20);
     let (cpus, stop) = (Mutex::new(cpus), AtomicBool::new(false));
-    let matched = |pair: &Pair, tiles: &Tiles, bytes: u64| {
+    let matched = |pair: &Pair, tiles: &Tiles, known: Option<Conditioning>, bytes: u64| {
         let observer: Observer = &mut |_| goes_on([cancel, &stop]);
         let mut cpu = {
             let mut idle = locked(&cpus);
@@ -44,7 +47,7 @@ pub(super) fn side_by_side(
             );
             cpu
         };
-        let matched = pollster::block_on(timed(&mut cpu, false, tiles, pair, observer, None));
+        let matched = pollster::block_on(timed(&mut cpu, false, tiles, (pair, known), observer, None));
         locked(&cpus).push(cpu);
         Ok(Matched { note: given_up.clone(), ..matched? })
     };
@@ -61,13 +64,20 @@ pub(super) fn side_by_side(
             for (pair, range) in pairs {
                 let planned = planned(&pair, range, method);
                 let share = room.share(planned.as_ref().map_or(0, |(_, bytes)| *bytes));
+                // Measure here: the next frames need it, and a thread of the pool that waited for it might wait for itself.
+                let planned = planned.and_then(|(tiles, bytes)| {
+                    let observer: Observer = &mut |_| goes_on([cancel, stop]);
+                    let known = pool.install(|| corrections.of(&pair, tiles.whole(), observer))?;
+                    Ok((tiles, known, bytes))
+                });
                 let (answer, answered) = sync_channel(1);
                 if begun.send(answered).is_err() {
                     // `take` has ended.
                     break;
                 }
                 scope.spawn(move |_| {
-                    let _ = answer.send(planned.and_then(|(tiles, bytes)| matched(&pair, &tiles, bytes)));
+                    let _ = answer
+                        .send(planned.and_then(|(tiles, known, bytes)| matched(&pair, &tiles, known, bytes)));
                     drop(share);
                 });
             }

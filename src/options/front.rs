@@ -1,8 +1,8 @@
 //! Options of the front end.
 
-use super::row::{Takes, options};
+use super::row::{Takes, options, whole};
 #[cfg(feature = "paper")]
-use super::row::{one_of, real, whole, words};
+use super::row::{one_of, real, words};
 
 #[cfg(feature = "paper")]
 words! {
@@ -46,6 +46,9 @@ options! {
         /// Smooths both views if they share little of their finest detail, a sign of noise, or if JPEG has
         /// left steps between its blocks of 8 x 8 pixels.
         denoise: bool = true, takes Takes::Switch, source "not in the paper";
+        /// Frames of a video from one measurement of these faults to the next. The frames between are corrected like the measured one.
+        /// A frame of another size or range is measured too. 1 measures every frame, for pairs of different cameras.
+        measure_every: u32 = 30, takes whole(1..=10_000), unit "frames", source "not in the paper";
         /// Number of clusters into which K-means sorts the Gabor responses of the reference image, for
         /// texture zones. Used if zone-sigmas is above 0.
         #[cfg(feature = "paper")]

@@ -1,5 +1,6 @@
 //! The list of steps of a match.
 
+use crate::front::conditioning::Conditioning;
 use crate::image::Rect;
 use crate::plan::Plan;
 use crate::stage::{Data, Stage, Volume};
@@ -150,6 +151,8 @@ impl Run {
 pub enum Step {
     /// Conditions the pair.
     Condition,
+    /// Makes these corrections to the pair, instead of measuring them.
+    Correct(Conditioning),
     /// Replaces the pair by the pair at twice its size.
     Double,
     /// Loads this frame into the backend; the stages that follow work on it.
@@ -212,6 +215,18 @@ impl Program {
     pub fn waits_once(&self) -> bool {
         let waits = |step: &Step| matches!(step, Step::Collect | Step::Place(_));
         self.steps.iter().position(waits) == Some(self.steps.len() - 1)
+    }
+
+    /// The same match, with corrections that are `known`, if any, instead of measured ones.
+    #[must_use]
+    pub fn corrected(mut self, known: Option<Conditioning>) -> Self {
+        if let Some(known) = known {
+            self.steps
+                .iter_mut()
+                .filter(|step| **step == Step::Condition)
+                .for_each(|step| *step = Step::Correct(known));
+        }
+        self
     }
 
     /// Each step with the plan of the current frame (the first one until a frame is entered).

@@ -10,7 +10,8 @@ use super::*;
 
 const SIZE: (u32, u32) = (64, 48);
 const SCENES: [&str; 3] = ["slanted", "thin", "repetitive"];
-const RANGE: &str = "--max-disparity 23 --device cpu";
+/// Each frame is measured, because they show different scenes.
+const RANGE: &str = "--max-disparity 23 --device cpu --set measure-every=1";
 const START: u64 = 1_700_000_000_000_000_000;
 /// Nanoseconds between two frames.
 const STEP: u64 = 50_000_000;

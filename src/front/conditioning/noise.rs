@@ -50,12 +50,14 @@ fn details(pair: &Pair, m: &SparseMatch) -> Option<[[i32; PIXELS]; 2]> {
     let best = (1..scores.len() - 1).max_by(|a, b| scores[*a].total_cmp(&scores[*b]))?;
     let (before, peak, after) = (scores[best - 1], scores[best], scores[best + 1]);
     let bend = before - 2.0 * peak + after;
-    let whole = bend < 0.0 && (before - after).abs() <= -2.0 * bend * NEARLY_WHOLE;
-    let mut details = [left.fine, places[best].fine];
+    if bend >= 0.0 || (before - after).abs() > -2.0 * bend * NEARLY_WHOLE {
+        return None;
+    }
+    let mut details = [left.fine(), places[best].fine()];
     let mut sizes: Vec<i32> = details.iter().flatten().map(|v| v.abs()).collect();
     let median = *sizes.select_nth_unstable(PIXELS).1;
     details.iter_mut().flatten().for_each(|v| *v = (*v).clamp(-MAX_DETAIL * median, MAX_DETAIL * median));
-    whole.then_some(details)
+    Some(details)
 }
 
 /// The sum of products over the root of the product of the sums of squares; 1 where a sum is 0.
@@ -70,10 +72,10 @@ fn correlation<'a>(a: impl IntoIterator<Item = &'a i32>, b: impl IntoIterator<It
 
 /// The grey around a pixel, in 1/16 of an 8-bit level.
 struct Patch {
-    /// Smoothed by a binomial filter of 3 x 3 pixels, less the mean.
+    grey: [[i32; SIDE + 2]; SIDE + 2],
+    /// Smoothed by a binomial filter of 3 x 3 pixels, times 16, less the mean.
     coarse: [i32; PIXELS],
-    /// The detail that the filter removes.
-    fine: [i32; PIXELS],
+    mean: i32,
 }
 
 impl Patch {
@@ -100,8 +102,12 @@ impl Patch {
             let (x, y) = (at % SIDE, at / SIDE);
             across[y][x] + 2 * across[y + 1][x] + across[y + 2][x]
         });
-        let fine = from_fn(|at| grey[at / SIDE + 1][at % SIDE + 1] - sums[at] / 16);
         let mean = sums.iter().sum::<i32>() / PIXELS as i32;
-        Some(Self { coarse: sums.map(|sum| sum - mean), fine })
+        Some(Self { grey, coarse: sums.map(|sum| sum - mean), mean })
+    }
+
+    /// The detail that the filter removes.
+    fn fine(&self) -> [i32; PIXELS] {
+        from_fn(|at| self.grey[at / SIDE + 1][at % SIDE + 1] - (self.coarse[at] + self.mean) / 16)
     }
 }

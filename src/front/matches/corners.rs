@@ -28,13 +28,13 @@ pub(super) fn corners(
     if let Some((map, _)) = zones {
         assert_eq!(map.size(), (width, height), "the map of zones has the size of the images");
     }
-    let mut values = Plane::filled(width, height, 0.0);
-    let rows = values.data_mut().par_chunks_mut(width).enumerate();
-    rows.for_each(|(y, row)| row.copy_from_slice(&view.eigenvalues(y)));
+    let values = view.eigenvalues();
     // On a tie, the earlier one in raster order wins.
     let is_peak = |x: usize, y: usize| {
         let value = values[(x, y)];
+        // Most pixels are below one beside them.
         value > 0.0
+            && [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)].iter().all(|beside| values[*beside] <= value)
             && (y - PEAK_RADIUS..=y + PEAK_RADIUS).all(|v| {
                 (x - PEAK_RADIUS..=x + PEAK_RADIUS)
                     .all(|u| value.total_cmp(&values[(u, v)]).then((v, u).cmp(&(y, x))).is_ge())
@@ -47,17 +47,17 @@ pub(super) fn corners(
         .into_par_iter()
         .flat_map_iter(|(left, top)| {
             let mut of_zone = BTreeMap::<u32, (usize, Vec<(usize, usize)>)>::new();
-            for y in top..(top + side).min(height) {
-                for x in left..(left + side).min(width) {
-                    let zone = zones.map_or(0, |(map, _)| map[(x, y)]);
-                    if zones.is_none_or(|(_, count)| (zone as usize) < count) {
-                        let (pixels, optima) = of_zone.entry(zone).or_default();
-                        *pixels += 1;
-                        if is_peak(x, y) {
-                            optima.push((x, y));
-                        }
-                    }
+            let (rows, columns) = (top..(top + side).min(height), left..(left + side).min(width));
+            let pixels = rows.len() * columns.len();
+            let cell = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+            if let Some((map, count)) = zones {
+                for (x, y) in cell.filter(|at| (map[*at] as usize) < count) {
+                    let (pixels, optima) = of_zone.entry(map[(x, y)]).or_default();
+                    *pixels += 1;
+                    optima.extend(is_peak(x, y).then_some((x, y)));
                 }
+            } else {
+                of_zone.insert(0, (pixels, cell.filter(|(x, y)| is_peak(*x, *y)).collect()));
             }
             of_zone.into_values().flat_map(|(pixels, mut optima)| {
                 optima.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
@@ -96,10 +96,10 @@ mod tests {
 
         // The maximum is among them, and no corner is next to a better one.
         let all = corners(&view, None, 256);
-        let values: Vec<Vec<f64>> = (0..128).map(|y| view.eigenvalues(y)).collect();
+        let values = view.eigenvalues();
         for &(x, y, _) in &all {
             let around = (y - 2..=y + 2).flat_map(|v| (x - 2..=x + 2).map(move |u| (u, v)));
-            assert!(around.into_iter().all(|(u, v)| values[v][u] <= values[y][x]));
+            assert!(around.into_iter().all(|at| values[at] <= values[(x, y)]));
         }
     }
 
@@ -110,7 +110,8 @@ mod tests {
             [if (10..30).contains(&x) && (10..30).contains(&y) { 200 } else { 0 }; 3]
         }));
         let view = View::new(&image);
-        let row = view.eigenvalues(20);
+        let values = view.eigenvalues();
+        let row = values.row(20);
         assert!(row.iter().all(|&value| value == 0.0), "{row:?}");
         let found = corners(&view, None, 64);
         assert_eq!(found.len(), 4, "{found:?}");
@@ -125,7 +126,7 @@ mod tests {
             xy += dx * dy;
             yy += dy * dy;
         }
-        let value = view.eigenvalues(10)[10];
+        let value = values[(10, 10)];
         // For [[xx, xy], [xy, yy]]: the determinant of the tensor minus the value on its diagonal is 0.
         let determinant = (xx - value) * (yy - value) - xy * xy;
         assert!(value > 0.0 && determinant.abs() < 1e-9 * xx * yy && 2.0 * value <= xx + yy);

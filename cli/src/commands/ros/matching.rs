@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::Matcher;
 use mrfgs::calibration::cameras::ThirdCamera;
 use mrfgs::depth::Rig;
 use mrfgs::image::Pair;
@@ -12,6 +11,7 @@ use mrfgs::rectification::Rectification;
 use mrfgs::sigma::Sigma;
 use mrfgs::steady::Steady;
 use mrfgs::threads;
+use mrfgs::{Conditioning, Matcher};
 use mrfgs_ros::messages::{CameraInfo, Encoding, Header};
 
 use crate::args::Sign;
@@ -33,6 +33,8 @@ pub(super) struct Matching<'a> {
     cameras: CameraTopics,
     matcher: Matcher,
     sigma: Sigma,
+    /// Frames from one measurement of what is corrected in them to the next.
+    measure_every: u32,
     /// The camera of `--into`.
     third: Option<ThirdCamera>,
     /// `None` before the first pair.
@@ -51,6 +53,8 @@ struct RigState {
     rig: Option<Rig>,
     messages: Messages,
     steady: Option<Steady>,
+    /// The corrections of the last measured frame, and the frames that they have been used for.
+    corrections: Option<(Conditioning, u32)>,
 }
 
 impl<'a> Matching<'a> {
@@ -58,11 +62,13 @@ impl<'a> Matching<'a> {
         let third = args.also.third()?;
         let method = args.also.made_by(args.method.method()?)?;
         let sigma = Sigma::for_method(&method);
+        // A correction of the calibration also changes the faults that are left in the frames.
+        let measure_every = if args.recalibrate { 1 } else { method.front.measure_every };
         if args.are_rectified(&cameras) {
             args.rectification.options_if(false)?;
         }
         let matcher = Matcher::builder().method(method).execution(execution).build()?;
-        Ok(Self { args, cameras, matcher, sigma, third, known: None, noted: false })
+        Ok(Self { args, cameras, matcher, sigma, measure_every, third, known: None, noted: false })
     }
 
     /// Matches a pair and publishes the results; `infos` are the cameras' calibrations. Errors of single pairs go to the log.
@@ -110,7 +116,13 @@ impl<'a> Matching<'a> {
         }
         let Some(known) = &mut self.known else { return Ok([None, None]) };
         let (pair, _) = known.rectifier.rectified(pair)?;
-        let matched = self.matcher.job(&pair, known.range).cancel(stop::flag()).run()?;
+        let corrections = known.corrections.filter(|(_, used)| *used < self.measure_every);
+        let mut job = self.matcher.job(&pair, known.range).cancel(stop::flag());
+        if let Some((measured, _)) = corrections {
+            job = job.conditioning(measured);
+        }
+        let matched = job.run()?;
+        known.corrections = Some((matched.conditioning, corrections.map_or(0, |(_, used)| used) + 1));
         if let Some(note) = matched.note.as_ref().filter(|_| !std::mem::replace(&mut self.noted, true)) {
             console::say(&remedy::error(note, &remedy::FLAGS));
         }
@@ -185,7 +197,7 @@ impl<'a> Matching<'a> {
             Messages::new(range, cameras, args.also.framed(self.third.as_ref())),
             args.steady.then(Steady::new),
         );
-        Ok(RigState { size, infos, range, rectifier, rig, messages, steady })
+        Ok(RigState { size, infos, range, rectifier, rig, messages, steady, corrections: None })
     }
 
     /// The cameras' own calibrations as texts of files; `None` if the user gives the cameras.

@@ -66,7 +66,8 @@ Examples:
 /// them. A recording has disparities on /disparity, and with --also depth, depth-mm, depth-registered, points, confidence or validity those
 /// too, with the times of the left images. Foxglove shows the same messages while frames are matched; a slow viewer gets the newest.
 ///
-/// Without --max-disparity the range is that of the calibration, or estimated from the first frame. Reading, rectifying, matching and
+/// Without --max-disparity the range is that of the calibration, or estimated from the first frame. Offset rows, blur and noise are measured
+/// on every 30th frame, and corrected alike in the frames between (--set measure-every=N). Reading, rectifying, matching and
 /// writing run at the same time; the CPU path matches as many frames at once as it has threads and --memory allows. After an error or
 /// Ctrl-C, the maps of all earlier frames are complete.
 #[derive(clap::Args)]
@@ -176,7 +177,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         args.maps.also.check(rectify)?;
     }
     let third = args.maps.also.third()?;
-    let method = args.maps.also.made_by(args.method.method()?)?;
+    let mut method = args.maps.also.made_by(args.method.method()?)?;
+    if args.recalibrate {
+        // A correction also changes the faults that are left in the frames.
+        method.front.measure_every = 1;
+    }
     let rectifying = args.rectification.options_if(rectify)?;
     let remarks = recorded.as_ref().map(Recorded::remarks);
     let mut frames = match recorded {
