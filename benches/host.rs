@@ -3,6 +3,12 @@
 //! By default on a backend that takes no time and computes nothing, so that only the host's work remains; with `gpu` on the preferred
 //! device, whose driver may compute on the processor.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a bench that cannot go on panics, and prints its figures"
+)]
+
 #[path = "../cli/src/commands/bench/synthetic.rs"]
 #[allow(dead_code, reason = "the program has scenes of its own")]
 mod synthetic;

@@ -1,6 +1,8 @@
 //! What the host does for a pair on a device, counted on a backend that accepts every command and computes
 //! nothing, so that no driver is needed.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
+
 #[path = "../cli/src/commands/bench/synthetic.rs"]
 #[allow(dead_code, reason = "the program has scenes of its own")]
 mod synthetic;

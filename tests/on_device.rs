@@ -1,5 +1,7 @@
 //! Frames on a caller's device: the maps are those of the same frames from files, and nothing waits.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
+
 use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::on_device::wgpu::{self, util::DeviceExt};
 use mrfgs::on_device::{DeviceMaps, DeviceMatcher, Frame, Gpu};
@@ -7,6 +9,9 @@ use mrfgs::options::{DisparityRange, Execution};
 use mrfgs::{Matcher, Method};
 use pollster::block_on;
 use std::io::Write;
+
+/// Puts a view on a device.
+type View<'a> = &'a dyn Fn(&Image) -> Frame;
 
 const RANGE: DisparityRange = DisparityRange { min: 0, max: 31 };
 
@@ -135,7 +140,7 @@ fn frames_on_a_device_give_the_maps_of_the_same_frames_from_files() {
         let mut matcher = open.matcher(pair.size(), &Method::preset(preset).unwrap()).unwrap();
         block_on(matcher.self_test()).unwrap();
         let width = pair.size().0;
-        let frames: [(&str, &dyn Fn(&Image) -> Frame); 5] = [
+        let frames: [(&str, View); 5] = [
             ("RGBA", &|view| open.texture(view, Rgba8Unorm)),
             ("BGRA", &|view| open.texture(view, Bgra8UnormSrgb)),
             ("dense rows", &|view| open.buffer(view, 4 * width, false)),

@@ -91,7 +91,9 @@ impl<U: Units> Volumes<U> {
         let wide = u16::from_ne_bytes([byte; 2]);
         self.fine_cost.fill(byte);
         self.labels.fill(wide);
-        Stage::all(&self.plan).into_iter().for_each(|stage| self.messages.send(stage));
+        for stage in Stage::all(&self.plan) {
+            self.messages.send(stage);
+        }
         for level in &mut self.levels {
             level.cost.fill(wide);
             level.evidence.fill(byte);
@@ -108,7 +110,7 @@ impl<U: Units> Volumes<U> {
 
     /// Counts the messages of `volume` as sent; those between the same two levels are 0 unless they were sent.
     fn send(&mut self, volume: Volume) {
-        if let (true, Volume::Up(z)) | (true, Volume::Down(z)) = (self.messages.lacks(volume), volume) {
+        if let (true, Volume::Up(z) | Volume::Down(z)) = (self.messages.lacks(volume), volume) {
             let coarser = z + usize::from(volume == Volume::Down(z));
             self.levels[coarser].up.fill(U::default());
             self.levels[coarser - 1].down.fill(U::default());

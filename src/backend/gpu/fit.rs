@@ -63,13 +63,11 @@ impl Gpu {
     pub(super) fn commands_of(&mut self, run: &Run) -> Result<Arc<[Command]>> {
         let mut state = self.state.take().expect("prepare comes before every stage");
         let of_run = (run.clone(), sent(&state, run));
-        let commands = match state.commands.get(&of_run) {
-            Some(commands) => Ok(Arc::clone(commands)),
-            None => {
-                let recorded =
-                    |gpu: &mut Self| gpu.recorded(run, &of_run.1, &state.plan, &state.buffers, None);
-                self.device.look().and_then(|()| recorded(self))
-            }
+        let commands = if let Some(commands) = state.commands.get(&of_run) {
+            Ok(Arc::clone(commands))
+        } else {
+            let recorded = |gpu: &mut Self| gpu.recorded(run, &of_run.1, &state.plan, &state.buffers, None);
+            self.device.look().and_then(|()| recorded(self))
         };
         if let Ok(commands) = &commands {
             run.stages().for_each(|stage| state.messages.send(stage));

@@ -316,14 +316,17 @@ impl Gpu {
     /// Unpacks the uploaded pair.
     fn unpack(&mut self, state: &mut State, unpacking: Unpacking) -> Result<()> {
         let State { plan, buffers, upload, .. } = state;
-        if !upload.contains_key(&unpacking) {
+        let commands = if let Some(commands) = upload.get(&unpacking) {
+            Arc::clone(commands)
+        } else {
             let record = |recorder: &mut Recorder| record_upload(recorder, unpacking);
-            upload.insert(unpacking, self.recorded_at(0, plan, buffers, 0.0, None, record)?);
-        }
+            self.recorded_at(0, plan, buffers, 0.0, None, record)?
+        };
         // The upload is no run of a stage, so it is not timed.
         let timer = self.timer.take();
-        let recorded = self.record(&upload[&unpacking]);
+        let recorded = self.record(&commands);
         self.timer = timer;
+        upload.insert(unpacking, commands);
         recorded
     }
 

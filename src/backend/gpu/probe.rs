@@ -137,7 +137,9 @@ impl Probe for Gpu {
     fn poison(&mut self, byte: u8) -> Result<()> {
         self.submit()?;
         let State { plan, messages, .. } = self.state.as_mut().expect("a match to poison");
-        Stage::all(plan).into_iter().for_each(|stage| messages.send(stage));
+        for stage in Stage::all(plan) {
+            messages.send(stage);
+        }
         let all = self.state().buffers.written().to_vec();
         for buffer in all {
             self.device.write(&buffer, &vec![byte; buffer.size() as usize])?;
@@ -150,7 +152,7 @@ impl Gpu {
     /// Counts the messages of `volume` as sent; those between the same two levels are 0 unless they were sent.
     fn send(&mut self, volume: Volume) -> Result<()> {
         let State { plan, buffers, messages, .. } = self.state.as_mut().expect("a match to write to");
-        if let (true, Volume::Up(z)) | (true, Volume::Down(z)) = (messages.lacks(volume), volume) {
+        if let (true, Volume::Up(z) | Volume::Down(z)) = (messages.lacks(volume), volume) {
             let coarser = z + usize::from(volume == Volume::Down(z));
             for volume in [Volume::Up(coarser), Volume::Down(coarser - 1)] {
                 let rows = buffers.volume(plan, volume);
