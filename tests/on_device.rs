@@ -5,15 +5,16 @@
 use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::on_device::wgpu::{self, util::DeviceExt};
 use mrfgs::on_device::{DeviceMaps, DeviceMatcher, Frame, Gpu};
-use mrfgs::options::{DisparityRange, Execution};
+use mrfgs::options::Execution;
 use mrfgs::{Matcher, Method};
 use pollster::block_on;
 use std::io::Write;
+use std::ops::RangeInclusive;
 
 /// Puts a view on a device.
 type View<'a> = &'a dyn Fn(&Image) -> Frame;
 
-const RANGE: DisparityRange = DisparityRange { min: 0, max: 31 };
+const RANGE: RangeInclusive<i32> = 0..=31;
 
 struct Open {
     info: wgpu::AdapterInfo,

@@ -28,10 +28,11 @@ use super::check::check;
 use crate::backend::Backend;
 pub use crate::backend::gpu::{DeviceMap, Frame, Gpu, wgpu};
 use crate::error::{Error, Result};
-use crate::options::{DisparityRange, Method};
+use crate::options::Method;
 use crate::plan::Plan;
 use crate::program::tiles::Tiles;
 use crate::program::{Program, Step};
+use std::ops::RangeInclusive;
 
 /// Matches pairs of one size over one range on a device.
 pub struct DeviceMatcher {
@@ -55,7 +56,7 @@ pub struct DeviceMaps {
 }
 
 impl DeviceMatcher {
-    /// A matcher of pairs of (width, height) pixels by `method`, whose corrections of a pair are turned off.
+    /// A matcher of pairs of (width, height) pixels over `range` by `method`, whose corrections of a pair are turned off.
     ///
     /// # Errors
     /// [`Error::Mismatch`] for methods that need more than one match of a pair or data of the host: tiles, twice
@@ -64,13 +65,13 @@ impl DeviceMatcher {
     pub fn new(
         mut gpu: Gpu,
         size: (usize, usize),
-        range: impl Into<DisparityRange>,
+        range: RangeInclusive<i32>,
         method: &Method,
     ) -> Result<Self> {
         let mut method = method.clone();
         let front = &mut method.front;
         (front.level_rows, front.equal_sharpness, front.denoise) = (false, false, false);
-        let plan = Plan::new(size.0, size.1, range.into(), &method)?;
+        let plan = Plan::new(size.0, size.1, range.try_into()?, &method)?;
         let program = Program::new(&Tiles::new(&plan)?)?;
         let on_host = plan.limits_labels() || method.front.corrects_illumination();
         if on_host || program.frames.len() > 1 || !program.waits_once() || method.refinement.right_map {

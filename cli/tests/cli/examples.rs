@@ -65,6 +65,7 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("use mrfgs::{Matcher, Pair};", "Rust"),
     ("use mrfgs::{Matcher, Method, Pair};", "Rust"),
     ("use mrfgs::image::raster::Raster;", "Rust"),
+    ("use mrfgs::Method;", "Rust; documentation and tests of `mrfgs::on_device` have the same calls"),
     ("import mrfgs", "Python; scripts/python tries the package"),
     ("from mcap_ros2.reader import read_ros2_messages", "Python; scripts/recordings reads such files"),
     (

@@ -1,22 +1,12 @@
 //! The queue of the device: records commands of stages, submits them, and requests results.
 
 use super::commands::{Command, Dispatch, Groups};
+use super::recording::Recording;
 use super::rows::Rows;
 use super::timer::{PASSES_PER_SUBMIT, Timer};
 use super::{Gpu, device};
 use crate::error::Result;
 use std::ops::Range;
-
-/// Commands that are recorded, but not submitted yet.
-#[derive(Default)]
-pub(super) struct Recording {
-    encoder: Option<wgpu::CommandEncoder>,
-    /// Takes all dispatches until a command of another kind, because each pass costs time of the host.
-    pass: Option<wgpu::ComputePass<'static>>,
-    /// Passes so far, and the work of their dispatches.
-    passes: usize,
-    work: u64,
-}
 
 impl Gpu {
     /// The encoder, for commands that belong to no pass.

@@ -16,11 +16,11 @@ shader! {
 
 /// The meaning of the bytes of a word.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub(in crate::backend::gpu) struct Unpacking {
+pub(crate) struct Unpacking {
     /// Whether the highest byte counts for nothing; otherwise it masks pixels.
-    pub(in crate::backend::gpu) is_opaque: bool,
+    pub(crate) is_opaque: bool,
     /// Whether the lowest byte is blue; otherwise it is red.
-    pub(in crate::backend::gpu) is_bgra: bool,
+    pub(crate) is_bgra: bool,
 }
 
 /// Unpacks the words of the pair.
