@@ -4,8 +4,7 @@
 
 use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::on_device::wgpu::{self, util::DeviceExt};
-use mrfgs::on_device::{DeviceMaps, DeviceMatcher, Frame, Gpu};
-use mrfgs::options::Execution;
+use mrfgs::on_device::{DeviceMaps, DeviceMatcher, Frame, OpenDevice};
 use mrfgs::{Matcher, Method};
 use pollster::block_on;
 use std::io::Write;
@@ -16,14 +15,8 @@ type View<'a> = &'a dyn Fn(&Image) -> Frame;
 
 const RANGE: RangeInclusive<i32> = 0..=31;
 
-struct Open {
-    info: wgpu::AdapterInfo,
-    device: wgpu::Device,
-    queue: wgpu::Queue,
-}
-
 /// A device as a caller opens it. Without a driver it is `None`, or a panic if `MRFGS_REQUIRE_GPU` is set.
-fn open() -> Option<Open> {
+fn open() -> Option<OpenDevice> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let adapter = match block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())) {
         Ok(adapter) => adapter,
@@ -34,13 +27,20 @@ fn open() -> Option<Open> {
         }
     };
     let (device, queue) = block_on(adapter.request_device(&wgpu::DeviceDescriptor::default())).unwrap();
-    Some(Open { info: adapter.get_info(), device, queue })
+    Some(OpenDevice { info: adapter.get_info(), device, queue })
 }
 
-impl Open {
+/// What tests do with a device.
+trait OnDevice {
+    fn matcher(&self, size: (usize, usize), method: &Method) -> mrfgs::Result<DeviceMatcher>;
+    fn texture(&self, view: &Image, format: wgpu::TextureFormat) -> Frame;
+    fn buffer(&self, view: &Image, bytes_per_row: usize, is_bgra: bool) -> Frame;
+    fn run(&self, maps: DeviceMaps) -> (Plane<i32>, Plane<u32>);
+}
+
+impl OnDevice for OpenDevice {
     fn matcher(&self, size: (usize, usize), method: &Method) -> mrfgs::Result<DeviceMatcher> {
-        let gpu = Gpu::from_wgpu(&self.info, self.device.clone(), self.queue.clone());
-        DeviceMatcher::new(gpu, size, RANGE, method)
+        DeviceMatcher::new(self.clone(), size, RANGE, method)
     }
 
     /// The view as a texture in `format`.
@@ -121,7 +121,7 @@ fn scene(preset: &str) -> (Pair, Method) {
     (pair.crop(&Rect { x: 20..187, y: 30..121 }), method)
 }
 
-/// The maps of the CPU path, like those of [`Open::run`].
+/// The maps of the CPU path, like those of [`OnDevice::run`].
 fn expected(pair: &Pair, method: &Method) -> (Plane<i32>, Plane<u32>) {
     let mut matcher = Matcher::builder().device("cpu").build().unwrap();
     let maps = matcher.job(pair, RANGE).method(method).run().unwrap().maps;
@@ -169,8 +169,7 @@ fn frames_on_a_device_give_the_maps_of_the_same_frames_from_files() {
 fn host_images_are_matched_on_a_device_of_the_caller() {
     let Some(open) = open() else { return };
     let (pair, method) = scene("default");
-    let gpu = Gpu::from_wgpu(&open.info, open.device.clone(), open.queue.clone());
-    let mut matcher = Matcher::on(Ok(gpu), false, &Execution::default()).unwrap();
+    let mut matcher = Matcher::on_device(open, None).unwrap();
     let maps = matcher.job(&pair, RANGE).method(&method).run().unwrap().maps;
     assert!(maps.disparity == expected(&pair, &method).0);
 }

@@ -147,10 +147,20 @@ impl Matcher {
         Builder::default()
     }
 
+    /// A matcher of the preset `default` on a device that is open already. It does not fall back to the CPU path.
+    ///
+    /// # Errors
+    /// [`Error::Execution`] for an invalid number of threads.
+    pub fn on_device(open: gpu::OpenDevice, threads: Option<usize>) -> Result<Self> {
+        let execution = Execution { threads, ..Execution::default() };
+        Self::on(Ok(Gpu::of_caller(open)), false, &execution)
+    }
+
     /// A matcher on `gpu`; if that fails or cannot serve, on the CPU path if it `falls_back`.
     ///
     /// # Errors
     /// [`Error::Execution`] for an invalid number of threads, and the error of `gpu` unless it falls back.
+    #[doc(hidden)]
     pub fn on(gpu: Result<Gpu>, falls_back: bool, execution: &Execution) -> Result<Self> {
         let threads = Arc::new(Threads::new(execution.threads)?);
         Self::build(Method::default(), Some(gpu), falls_back, threads, execution.timings)

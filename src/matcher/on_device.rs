@@ -1,8 +1,8 @@
 //! Matches frames that are on a device already, without a wait and without a copy to the host.
 //!
 //! [`DeviceMatcher`] records a match as commands for the caller's queue, and leaves the maps in buffers of the
-//! caller's device, where shaders can read them. [`Gpu::from_wgpu`] uses a device that is open already. Its
-//! version of `wgpu` is [`wgpu`].
+//! caller's device, where shaders can read them. The version of `wgpu` is that of [`wgpu`].
+//! [`Matcher::on_device`](crate::Matcher::on_device) matches images of the host on the same device.
 //!
 //! The frames are matched as they are: row offsets, differences of sharpness, and noise are measured on the host,
 //! and so they are neither found nor corrected here. With these corrections off, the maps are those of a
@@ -10,11 +10,11 @@
 //!
 //! ```no_run
 //! use mrfgs::Method;
-//! use mrfgs::on_device::{DeviceMatcher, Frame, Gpu, wgpu};
+//! use mrfgs::on_device::{DeviceMatcher, Frame, OpenDevice, wgpu};
 //!
 //! # fn of(info: wgpu::AdapterInfo, device: wgpu::Device, queue: wgpu::Queue, frames: Vec<[wgpu::Texture; 2]>) -> mrfgs::Result<()> {
-//! let gpu = Gpu::from_wgpu(&info, device.clone(), queue.clone());
-//! let mut matcher = DeviceMatcher::new(gpu, (640, 480), 0..=63, &Method::fast())?;
+//! let open = OpenDevice { info, device, queue: queue.clone() };
+//! let mut matcher = DeviceMatcher::new(open, (640, 480), 0..=63, &Method::fast())?;
 //! for [left, right] in frames {
 //!     let found = matcher.encode(&Frame::Texture(left), &Frame::Texture(right))?;
 //!     queue.submit(found.commands);
@@ -26,7 +26,8 @@
 
 use super::check::check;
 use crate::backend::Backend;
-pub use crate::backend::gpu::{DeviceMap, Frame, Gpu, wgpu};
+use crate::backend::gpu::Gpu;
+pub use crate::backend::gpu::{DeviceMap, Frame, OpenDevice, wgpu};
 use crate::error::{Error, Result};
 use crate::options::Method;
 use crate::plan::Plan;
@@ -63,7 +64,7 @@ impl DeviceMatcher {
     /// the size, the map of the right view, texture zones and the correction of the illumination; the errors of
     /// [`Job::run`](super::Job::run) for the size and the range.
     pub fn new(
-        mut gpu: Gpu,
+        open: OpenDevice,
         size: (usize, usize),
         range: RangeInclusive<i32>,
         method: &Method,
@@ -81,6 +82,7 @@ impl DeviceMatcher {
                     .into(),
             ));
         }
+        let mut gpu = Gpu::of_caller(open);
         let program = gpu.fit(program);
         Ok(Self { gpu, program, size })
     }

@@ -1,6 +1,7 @@
 //! An open device: submits commands, reads back buffers, and reports failures.
 
 use super::adapters::{adapters_of, api, driver, select};
+use super::frame::OpenDevice;
 use super::pace::Pace;
 use crate::backend::Traffic;
 use crate::error::{DeviceError, Error, MemoryError, Result};
@@ -142,8 +143,8 @@ impl Device {
     }
 
     /// A device that a caller has opened, with the handlers that the caller has set.
-    pub(super) fn of_caller(info: &wgpu::AdapterInfo, device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        Self::of(info, device.limits(), device, queue)
+    pub(super) fn of_caller(OpenDevice { info, device, queue }: OpenDevice) -> Self {
+        Self::of(&info, device.limits(), device, queue)
     }
 
     fn of(info: &wgpu::AdapterInfo, limits: wgpu::Limits, device: wgpu::Device, queue: wgpu::Queue) -> Self {

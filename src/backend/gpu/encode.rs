@@ -1,7 +1,7 @@
 //! Matches on the device of a caller: frames that are there already, and commands that the caller submits.
 
 use super::device::Device;
-use super::frame::{DeviceMap, Frame, copy};
+use super::frame::{DeviceMap, Frame, OpenDevice, copy};
 use super::stages::Unpacking;
 use super::{Gpu, State, uploaded_rows, uploaded_words};
 use crate::backend::Map;
@@ -10,11 +10,9 @@ use crate::plan::Plan;
 use crate::stage::Data;
 
 impl Gpu {
-    /// Uses a device that is open already, and its queue. Its handlers for errors and for its loss stay as they
-    /// are. It needs no features, and the default limits of WebGPU; larger buffers and bindings allow larger pairs.
-    #[must_use]
-    pub fn from_wgpu(info: &wgpu::AdapterInfo, device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        Self::on(Device::of_caller(info, device, queue))
+    /// Uses a device that is open already.
+    pub(crate) fn of_caller(open: OpenDevice) -> Self {
+        Self::on(Device::of_caller(open))
     }
 
     /// Loads the views of a match by `plan`, which are (width, height) pixels large. Nothing is submitted:

@@ -2,6 +2,19 @@
 
 pub use ::wgpu;
 
+/// A device that the caller has opened. mrfgs submits to its queue, and leaves its handlers for errors and for its
+/// loss as they are. It needs no features, and the default limits of WebGPU; larger buffers and bindings allow
+/// larger pairs.
+#[derive(Clone, Debug)]
+pub struct OpenDevice {
+    /// Its adapter.
+    pub info: wgpu::AdapterInfo,
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+}
+
 /// A view on a device, in 8 bits per channel. Alpha counts for nothing.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -33,7 +46,7 @@ impl Frame {
     }
 
     /// Refuses a frame that does not hold (width, height) pixels in a known format.
-    pub(super) fn check(&self, (width, height): (usize, usize)) -> std::result::Result<(), String> {
+    pub(super) fn check(&self, (width, height): (usize, usize)) -> Result<(), String> {
         use wgpu::TextureFormat::{Bgra8Unorm, Bgra8UnormSrgb, Rgba8Uint, Rgba8Unorm, Rgba8UnormSrgb};
         match self {
             Self::Texture(texture) => {

@@ -49,7 +49,7 @@ use commands::{Command, Pipelines, Recorder};
 use convergence::Convergence;
 use device::Device;
 pub use device::FaultInjection;
-pub use frame::{DeviceMap, Frame, wgpu};
+pub use frame::{DeviceMap, Frame, OpenDevice, wgpu};
 pub use kernel::{Bound, Kernel, MAX_LOOP_ITERATIONS};
 use recording::Recording;
 pub use shader::{Constant, Shader, binding_number};
