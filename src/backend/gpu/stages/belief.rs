@@ -49,8 +49,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
 
 /// Like `record`, in one dispatch for all `levels`.
 pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
-    let own: Vec<_> =
-        levels.clone().map(|z| (Uniform::of(r, z), threads(&r.buffers.levels[z]))).collect();
+    let own: Vec<_> = levels.clone().map(|z| (Uniform::of(r, z), threads(&r.buffers.levels[z]))).collect();
     let first = levels.start;
     r.levels(&main(r.plan, first), levels, |z| own[z - first])
 }
