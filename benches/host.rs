@@ -20,7 +20,6 @@ use mrfgs::low_level::program::Program;
 use mrfgs::low_level::program::tiles::Tiles;
 use mrfgs::{Conditioning, Method, Progress};
 use pollster::block_on;
-use rustix::time::{ClockId, clock_gettime};
 use std::ops::ControlFlow;
 use synthetic::Synthetic;
 
@@ -32,9 +31,17 @@ const PAIRS: [Synthetic; 3] = [
 const ROUNDS: usize = 15;
 
 /// Processor time of all threads so far, in ms.
+#[cfg(unix)]
 fn processor() -> f64 {
-    let time = clock_gettime(ClockId::ProcessCPUTime);
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 / 1e6
+}
+
+/// Wall-clock time so far, in ms, where no crate in use tells the processor time.
+#[cfg(not(unix))]
+fn processor() -> f64 {
+    static START: std::sync::LazyLock<std::time::Instant> = std::sync::LazyLock::new(std::time::Instant::now);
+    START.elapsed().as_secs_f64() * 1e3
 }
 
 fn main() {

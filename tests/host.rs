@@ -1,5 +1,5 @@
-//! What the host does for a pair on a device, counted on a backend that accepts every command and computes
-//! nothing, so that no driver is needed.
+//! Counts the work of the host for a pair on a device. The backend accepts every command and computes nothing, so
+//! no driver is needed.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 

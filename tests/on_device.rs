@@ -2,12 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
+mod common;
+
+use common::devices;
 use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::on_device::wgpu::{self, util::DeviceExt};
 use mrfgs::on_device::{DeviceMaps, DeviceMatcher, Frame, OpenDevice};
 use mrfgs::{Matcher, Method};
 use pollster::block_on;
-use std::io::Write;
 use std::ops::RangeInclusive;
 
 /// Puts a view on a device.
@@ -15,14 +17,13 @@ type View<'a> = &'a dyn Fn(&Image) -> Frame;
 
 const RANGE: RangeInclusive<i32> = 0..=31;
 
-/// A device as a caller opens it. Without a driver it is `None`, or a panic if `MRFGS_REQUIRE_GPU` is set.
+/// A device as a caller opens it. Without a driver it is `None`, or a [panic](devices::skip).
 fn open() -> Option<OpenDevice> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let adapter = match block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())) {
         Ok(adapter) => adapter,
         Err(e) => {
-            assert!(std::env::var("MRFGS_REQUIRE_GPU").is_err(), "MRFGS_REQUIRE_GPU is set: {e}");
-            let _ = writeln!(std::io::stderr(), "SKIPPED on the GPU: {e}");
+            devices::skip(&e);
             return None;
         }
     };
@@ -30,7 +31,7 @@ fn open() -> Option<OpenDevice> {
     Some(OpenDevice { info: adapter.get_info(), device, queue })
 }
 
-/// What tests do with a device.
+/// Puts frames on a device, and reads its maps.
 trait OnDevice {
     fn matcher(&self, size: (usize, usize), method: &Method) -> mrfgs::Result<DeviceMatcher>;
     fn texture(&self, view: &Image, format: wgpu::TextureFormat) -> Frame;

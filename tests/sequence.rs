@@ -164,7 +164,7 @@ fn unfocused() -> Vec<(Pair, DisparityRange)> {
     in_turns(&one, &one.mirrored())
 }
 
-/// What is corrected is measured on the first frame of each group alone, whatever runs the match.
+/// The corrections of a group of frames are measured on its first frame only, on every backend and number of threads.
 #[test]
 fn frames_are_corrected_like_the_measured_one() {
     for (preset, frames) in [("default", slipping()), ("fast", unfocused())] {

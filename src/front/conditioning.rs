@@ -67,7 +67,7 @@ impl Conditioning {
         Self { offset: 2 * self.offset, smoothing: self.smoothing.map(|sigma| 2.0 * sigma) }
     }
 
-    /// The same corrections for the pair at half its size.
+    /// Halves the corrections, for the pair at half its size.
     pub(super) fn halved(&self) -> Self {
         Self { offset: self.offset / 2, smoothing: self.smoothing.map(|sigma| sigma / 2.0) }
     }

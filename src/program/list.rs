@@ -62,6 +62,14 @@ pub struct Sent {
     pub below: bool,
 }
 
+impl Sent {
+    /// All messages that level `z` of `levels` can have.
+    #[must_use]
+    pub fn all(z: usize, levels: usize) -> Self {
+        Self { dependency: true, above: z + 1 < levels, below: z > 0 }
+    }
+}
+
 /// The messages of all levels that have been sent, followed from stage to stage.
 #[derive(Clone, Debug)]
 pub struct SentMessages {
@@ -92,13 +100,25 @@ impl SentMessages {
     }
 
     /// Adds the messages of `volume`; those between two levels are sent together.
-    pub fn add(&mut self, volume: Volume) {
+    fn add(&mut self, volume: Volume) {
         match volume {
             Volume::Dependency(z) => self.dependency[z] = true,
             Volume::Up(z) => self.resolution[z] = true,
             Volume::Down(z) => self.resolution[z + 1] = true,
             _ => {}
         }
+    }
+
+    /// Adds the messages of `volume`, for a caller that writes it. Returns the volumes that have to be 0 before, because resolution
+    /// factors send both at once and had sent none.
+    pub fn write(&mut self, volume: Volume) -> Vec<Volume> {
+        let unsent = match volume {
+            Volume::Up(z) if self.lacks(volume) => vec![volume, Volume::Down(z - 1)],
+            Volume::Down(z) if self.lacks(volume) => vec![volume, Volume::Up(z + 1)],
+            _ => Vec::new(),
+        };
+        self.add(volume);
+        unsent
     }
 
     /// Whether `volume` holds messages that have not been sent.
@@ -217,7 +237,7 @@ impl Program {
         self.steps.iter().position(waits) == Some(self.steps.len() - 1)
     }
 
-    /// The same match, with corrections that are `known`, if any, instead of measured ones.
+    /// Replaces the measurement of the corrections by those that are `known`, if any.
     #[must_use]
     pub fn corrected(mut self, known: Option<Conditioning>) -> Self {
         if let Some(known) = known {

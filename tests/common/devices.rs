@@ -17,17 +17,20 @@ use std::time::Duration;
 /// Idle devices, because opening a device and compiling its shaders takes longer than most tests.
 static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
 
-/// A separate GPU with injected faults. Without a driver it is `None`, which is reported on stderr, or a
-/// panic if `MRFGS_REQUIRE_GPU` is set and not 0.
+/// Reports on stderr that there is no GPU, or panics if `MRFGS_REQUIRE_GPU` is set and not 0.
+pub fn skip(reason: &dyn std::fmt::Display) {
+    let required = std::env::var("MRFGS_REQUIRE_GPU").is_ok_and(|v| v != "0" && !v.is_empty());
+    assert!(!required, "MRFGS_REQUIRE_GPU is set and there is none: {reason}");
+    // Bypasses the output capture of the test harness: a test without its GPU must not look like a passed one.
+    let _ = writeln!(std::io::stderr(), "SKIPPED on the GPU: {reason}");
+}
+
+/// A separate GPU with injected faults. Without a driver it is `None`, or a [panic](skip).
 pub fn open(faults: FaultInjection) -> Option<Gpu> {
     match Gpu::with_faults(None, faults) {
         Ok(gpu) => Some(gpu),
         Err(e) => {
-            let required = std::env::var("MRFGS_REQUIRE_GPU").is_ok_and(|v| v != "0" && !v.is_empty());
-            assert!(!required, "MRFGS_REQUIRE_GPU is set and there is none: {e}");
-            // Bypasses the output capture of the test harness: a test without its GPU must not look like a
-            // passed one.
-            let _ = writeln!(std::io::stderr(), "SKIPPED on the GPU: {e}");
+            skip(&e);
             None
         }
     }

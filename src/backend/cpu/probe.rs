@@ -108,16 +108,6 @@ impl<U: Units> Volumes<U> {
         }
     }
 
-    /// Counts the messages of `volume` as sent; those between the same two levels are 0 unless they were sent.
-    fn send(&mut self, volume: Volume) {
-        if let (true, Volume::Up(z) | Volume::Down(z)) = (self.messages.lacks(volume), volume) {
-            let coarser = z + usize::from(volume == Volume::Down(z));
-            self.levels[coarser].up.fill(U::default());
-            self.levels[coarser - 1].down.fill(U::default());
-        }
-        self.messages.add(volume);
-    }
-
     fn read(&self, volume: Volume) -> Vec<u32> {
         let (rows, labels, stride) = volume_shape(&self.plan, volume);
         let z = volume.level();
@@ -157,7 +147,11 @@ impl<U: Units> Volumes<U> {
 
     fn write(&mut self, volume: Volume, values: &[u32]) {
         let z = volume.level();
-        self.send(volume);
+        for unsent in self.messages.write(volume) {
+            let level = &mut self.levels[unsent.level()];
+            let messages = if matches!(unsent, Volume::Up(_)) { &mut level.up } else { &mut level.down };
+            messages.fill(U::default());
+        }
         let padded = || PaddedRows::new(&self.plan, volume, values);
         let (plan, l) = (&self.plan.levels[z], &mut self.levels[z]);
         match volume {

@@ -112,8 +112,8 @@ impl<'a> Recorder<'a> {
 
     /// The messages that exist at level `z` of the run.
     pub(super) fn sent(&self, z: usize) -> Sent {
-        let all = Sent { dependency: true, above: z + 1 < self.plan.levels.len(), below: z > 0 };
-        self.sent.get(z - self.level).copied().unwrap_or(all)
+        let sent = self.sent.get(z - self.level).copied();
+        sent.unwrap_or_else(|| Sent::all(z, self.plan.levels.len()))
     }
 
     /// The parameters of the level for shaders.

@@ -42,6 +42,9 @@ const SOFTWARE_PATIENCE: Duration = Duration::from_secs(600);
 /// detection of a hang. In a browser, one is enough, and makes the progress bar exact.
 const SUBMISSIONS: usize = if cfg!(target_arch = "wasm32") { 1 } else { 4 };
 
+/// Largest number of buffers that are kept for reading back: those of the maps of three pairs.
+const STAGING: usize = 12;
+
 /// Describes the smallest unit of a dispatch in errors.
 pub(super) const ONE_ROW: &str = "one row of the image and what it depends on";
 
@@ -329,7 +332,7 @@ impl Device {
         let later = (self.submitted - requested.submitted) as usize;
         self.wait_until_left(later).await?;
         // Any poll maps buffers whose submission has finished.
-        self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
+        self.look()?;
         let mut views = Vec::new();
         let mut buffers = Vec::new();
         for (buffer, mut mapped) in requested.buffers {
@@ -353,6 +356,8 @@ impl Device {
         drop(views);
         buffers.iter().for_each(wgpu::Buffer::unmap);
         self.staging.append(&mut buffers);
+        let surplus = self.staging.len().saturating_sub(STAGING);
+        self.staging.drain(..surplus);
         self.check()?;
         Ok(read)
     }

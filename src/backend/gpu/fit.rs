@@ -80,15 +80,11 @@ impl Gpu {
 
 /// The messages that exist at each level of `run`; none listed if all do, or if it reads none.
 fn sent(state: &State, run: &Run) -> Vec<Sent> {
-    let (count, none) = (state.plan.levels.len(), Vec::new());
     if !run.stage.passes_messages() {
-        return none;
+        return Vec::new();
     }
     let at = |stage| run.band.as_ref().map_or_else(|| state.messages.at(stage), |band| band.sent);
-    let all = |stage: Stage| {
-        let z = stage.level().unwrap_or(0);
-        Sent { dependency: true, above: z + 1 < count, below: z > 0 }
-    };
+    let all = |stage: Stage| Sent::all(stage.level().unwrap_or(0), state.plan.levels.len());
     let sent: Vec<_> = run.stages().map(at).collect();
-    if run.stages().map(all).eq(sent.iter().copied()) { none } else { sent }
+    if run.stages().map(all).eq(sent.iter().copied()) { Vec::new() } else { sent }
 }

@@ -44,7 +44,11 @@ impl Probe for Gpu {
 
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
         self.submit()?;
-        self.send(volume)?;
+        let State { plan, buffers, messages, .. } = self.state.as_mut().expect("a match to write to");
+        for unsent in messages.write(volume) {
+            let words = Data::Volume(unsent).array(plan).words * plan.levels[unsent.level()].height;
+            buffers.volume(plan, unsent).write(&mut self.device, &vec![0; words])?;
+        }
         let (buffer, pitch, per_word) = self.volume(volume);
         let plan = &self.state().plan;
         let height = plan.levels[volume.level()].height;
@@ -149,22 +153,6 @@ impl Probe for Gpu {
 }
 
 impl Gpu {
-    /// Counts the messages of `volume` as sent; those between the same two levels are 0 unless they were sent.
-    fn send(&mut self, volume: Volume) -> Result<()> {
-        let State { plan, buffers, messages, .. } = self.state.as_mut().expect("a match to write to");
-        if let (true, Volume::Up(z) | Volume::Down(z)) = (messages.lacks(volume), volume) {
-            let coarser = z + usize::from(volume == Volume::Down(z));
-            for volume in [Volume::Up(coarser), Volume::Down(coarser - 1)] {
-                let rows = buffers.volume(plan, volume);
-                let words =
-                    vec![0; Data::Volume(volume).array(plan).words * plan.levels[volume.level()].height];
-                rows.write(&mut self.device, &words)?;
-            }
-        }
-        messages.add(volume);
-        Ok(())
-    }
-
     /// The rate at which the device copies between two large buffers: bytes read and written per second.
     ///
     /// # Errors
