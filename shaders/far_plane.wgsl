@@ -364,7 +364,7 @@ fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let low = params.level.low;
         let range = FRACTION * vec2(low, low + i32(params.level.labels) - 1);
         let value = clamp(value_at(plane, pixel), range.x, range.y);
-        if (flags[at] & FILLED) != 0u {
+        if is_filled(flags[at]) {
             disparity[at] = value;
         } else if in_doubt && abs(value - disparity[at]) > OUTVOTES {
             disparity[at] = value;

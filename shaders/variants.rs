@@ -19,7 +19,7 @@ fn values(key: &Key) -> Vec<String> {
     }
 }
 
-/// A plan for every preset, the default first, and for every change of one or two of its options. The
+/// A plan for every preset, the default first, with and without a prior, and for every change of one or two of its options. The
 /// constants of a kernel depend on few options each, so this covers all variants.
 pub(crate) fn plans() -> Vec<Plan> {
     let keys = GROUPS.iter().flat_map(|group| group.keys);
@@ -29,15 +29,15 @@ pub(crate) fn plans() -> Vec<Plan> {
     let mut plans = Vec::new();
     for preset in PRESETS {
         let preset = preset.method();
-        let mut add =
-            |method: &Method| plans.push(Plan::new(101, 67, range, method).expect("a valid method"));
-        add(&preset);
+        let plan = |method: &Method| Plan::new(101, 67, range, method).expect("a valid method");
+        // A prior adds stages.
+        plans.extend([plan(&preset), plan(&preset).with_prior(true)]);
         for (i, (key, value)) in changes.iter().enumerate() {
             for (other, other_value) in &changes[i..] {
                 let mut method = preset.clone();
                 // Some values cannot be combined.
                 if method.set_all([(&**key, &**value), (&**other, &**other_value)]).is_ok() {
-                    add(&method);
+                    plans.push(plan(&method));
                 }
             }
         }

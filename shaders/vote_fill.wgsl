@@ -128,7 +128,7 @@ fn halve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     let mean = select(vec3(0u), (2u * sum + vec3(count)) / vec3(2u * max(count, 1u)), count > 0u);
     for (var v = max(y, 2u) - 2u; v <= min(y + 3u, last.y); v++) {
         for (var u = max(x, 2u) - 2u; u <= min(x + 3u, last.x); u++) {
-            if (flags[(v - top) * params.level.pixel_pitch + u] & FILLED) != 0u {
+            if is_filled(flags[(v - top) * params.level.pixel_pitch + u]) {
                 asked = ASKED;
             }
         }
@@ -284,7 +284,7 @@ fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
     let at = id.y * params.level.pixel_pitch + id.x;
     let middle = vec2(id.x, params.band.first_row + id.y) >> vec2(1u);
-    if (flags[at] & FILLED) == 0u {
+    if !is_filled(flags[at]) {
         let vote = elected[(middle.y - params.first_voted) * params.half_pitch + middle.x];
         if may_be_outvoted(flags[at]) && vote != NONE && abs(vote - disparity[at]) > VOTE_OUTVOTES {
             disparity[at] = vote;

@@ -78,6 +78,7 @@
 //! - [`check`] warns of likely faults of a pair, and finds its disparity range.
 //! - [`calibration`] reads the calibrations of cameras, and [`rectification`] rectifies their images.
 //! - [`drift`] finds how the cameras of a rig have turned since they were calibrated, from their frames.
+//! - [`prior`] tells a match what is known of the scene: points of a LiDAR, a terrain model.
 //! - [`region`] matches a region of the left view alone.
 //! - [`steady`] smooths the maps of a video over time where the scene is static.
 //! - [`depth`] turns disparities into depths and points, for calibrated cameras.
@@ -124,6 +125,7 @@ pub mod options;
 #[cfg_attr(target_arch = "wasm32", path = "pause_in_browser.rs")]
 mod pause;
 mod plan;
+pub mod prior;
 mod process;
 mod program;
 #[cfg(feature = "cameras")]
@@ -154,4 +156,5 @@ pub use matcher::SharedMatcher;
 pub use matcher::on_device;
 pub use matcher::{Answer, AutoRange, Builder, Job, Matched, Matcher, Search, Timing};
 pub use options::Method;
+pub use prior::Prior;
 pub use watch::Progress;

@@ -93,7 +93,8 @@ pub mod roofline {
 
 /// The stages, exactly defined.
 pub mod stage {
-    pub use crate::stage::{Data, Map, Start};
+    pub use crate::stage::prior::{LabelPrior, LevelPriors};
+    pub use crate::stage::{Data, Map, NO_ANCHOR, Start};
 }
 
 /// Reads small text files, and quotes them in messages.

@@ -16,7 +16,8 @@ pub mod flag {
     pub const SPECKLE: u8 = 4;
     /// The confidence is below the floor; the disparity stays.
     pub const LOW_CONFIDENCE: u8 = 8;
-    /// The disparity is filled in from other pixels.
+    /// The disparity is filled in from other pixels. Alone, without a reason: no match was trusted, and a
+    /// [prior](crate::prior::Prior) decided.
     pub const FILLED: u8 = 16;
     /// The pixel is masked in the input, and has no disparity.
     pub const MASKED: u8 = 32;
@@ -74,6 +75,12 @@ pub struct RightMap {
 #[must_use]
 pub fn has_disparity(validity: u8) -> bool {
     validity & flag::INVALID == 0 || validity & flag::FILLED != 0
+}
+
+/// Whether a pixel with these validity bits is filled from the pixels around it; one that a prior decided is not.
+#[must_use]
+pub(crate) fn is_filled(validity: u8) -> bool {
+    validity & flag::INVALID != 0 && validity & flag::FILLED != 0
 }
 
 impl Maps {

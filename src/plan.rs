@@ -59,6 +59,14 @@ pub(crate) const WINDOW_SLACK: u16 = 8;
 pub(crate) const WINDOW_REACH: usize = 2;
 /// Minimum number of labels in a window on either side of each candidate.
 pub(crate) const WINDOW_MARGIN: i32 = 2;
+/// Bits of the fraction of a label in a prior's interval.
+pub(crate) const PRIOR_LABEL_BITS: u32 = 5;
+/// Bits of the fraction of a unit in the slope of a prior.
+pub(crate) const PRIOR_SLOPE_BITS: u32 = 4;
+/// Largest slope of a prior, in fractions of a unit per label.
+pub(crate) const PRIOR_SLOPE_MOST: u32 = (1 << 12) - 1;
+/// Largest distance from the interval of a prior that counts, in fractions of a label.
+pub(crate) const PRIOR_REACH: u32 = (1 << 16) - 1;
 
 // The largest costs of a label agree with the facts in the options.
 const _: () = {
@@ -169,6 +177,8 @@ pub struct Plan {
     pub memory: u32,
     /// Whether data that are never needed at the same time share memory.
     pub shares: bool,
+    /// Whether a [prior](crate::prior::Prior) of the scene is added to the evidence.
+    pub prior: bool,
 }
 
 impl Plan {
@@ -256,6 +266,7 @@ impl Plan {
             holds_costs: false,
             memory: method.tiles.memory,
             shares: false,
+            prior: false,
             method,
         })
     }
@@ -267,7 +278,14 @@ impl Plan {
     pub fn doubled(&self) -> Result<Option<Self>> {
         let Some(method) = self.method.at_double_size() else { return Ok(None) };
         let (width, height) = self.size();
-        Self::new(2 * width, 2 * height, self.range.doubled()?, &method).map(Some)
+        let plan = Self::new(2 * width, 2 * height, self.range.doubled()?, &method)?;
+        Ok(Some(plan.with_prior(self.prior)))
+    }
+
+    /// This plan, with or without a prior of the scene.
+    #[must_use]
+    pub fn with_prior(self, prior: bool) -> Self {
+        Self { prior, ..self }
     }
 
     /// Size and disparity range of the pair.

@@ -189,6 +189,7 @@ fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
     let (maps, traffic, cells) =
         (block_on(backend.maps(requested)).unwrap().0, backend.traffic(), backend.cells());
     Solution {
+        prior: None,
         maps,
         iterations: 0,
         conditioning: Conditioning::default(),

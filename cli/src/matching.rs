@@ -1,11 +1,13 @@
 //! Running a match, with a progress bar and a summary line.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use mrfgs::image::{Pair, Rect};
 use mrfgs::low_level::engine::Inspector;
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::{AutoRange, Job, Matched, Matcher, check};
+use mrfgs::prior::{PriorKind, PriorUse};
+use mrfgs::{AutoRange, Job, Matched, Matcher, Prior, check};
 
 use crate::console;
 use crate::failure::Result;
@@ -21,11 +23,13 @@ pub(crate) struct SearchSpace<'a> {
     pub(crate) may_widen: bool,
     /// The region of the left view; `None` for all of it.
     region: Option<&'a Rect>,
+    /// What is known of the scene.
+    prior: Option<&'a Arc<Prior>>,
 }
 
 impl From<DisparityRange> for SearchSpace<'_> {
     fn from(range: DisparityRange) -> Self {
-        Self { range, may_widen: false, region: None }
+        Self { range, may_widen: false, region: None, prior: None }
     }
 }
 
@@ -36,12 +40,18 @@ impl<'a> SearchSpace<'a> {
         by_matches: bool,
         fits: impl Fn(DisparityRange) -> bool,
     ) -> Self {
-        Self { range, may_widen: by_matches && check::beyond(range).is_some_and(fits), region: None }
+        let may_widen = by_matches && check::beyond(range).is_some_and(fits);
+        Self { may_widen, ..range.into() }
     }
 
     /// Restricts the search to `region`, if given.
     pub(crate) fn in_region(self, region: Option<&'a Rect>) -> Self {
         Self { region, ..self }
+    }
+
+    /// Adds what is known of the scene, if anything.
+    pub(crate) fn with_prior(self, prior: Option<&'a Arc<Prior>>) -> Self {
+        Self { prior, ..self }
     }
 
     /// A match of `pair` over this search space.
@@ -50,6 +60,10 @@ impl<'a> SearchSpace<'a> {
             matcher.job(pair, AutoRange(self.range))
         } else {
             matcher.job(pair, self.range)
+        };
+        let job = match self.prior {
+            Some(prior) => job.prior(Arc::clone(prior)),
+            None => job,
         };
         match self.region {
             Some(region) => job.region(region.clone()),
@@ -100,6 +114,24 @@ pub(crate) fn run(
         if !corrected.is_empty() {
             console::say(&format!("{name}{corrected}"));
         }
+        if let Some(used) = matched.prior {
+            say_prior(&name, used);
+        }
     }
     Ok((matched, time))
+}
+
+/// Prints what became of a prior, with a warning where the images contradict it.
+fn say_prior(name: &str, used: PriorUse) {
+    let PriorUse { kind, given, dropped, trust } = used;
+    let text = match kind {
+        PriorKind::Points => format!("{given} point{} of the prior, {dropped} dropped", plural(given)),
+        PriorKind::Surface => format!("a prior for {given} pixel{}", plural(given)),
+    };
+    let warning = match trust {
+        0.0 => "; warning: the images contradict it, so it was not used: is it of this scene, in pixels of disparity?".into(),
+        1.0 => String::new(),
+        _ => format!("; warning: the images contradict it in part, so it counts {:.0} %", 100.0 * trust),
+    };
+    console::say(&format!("{name}{text}{warning}"));
 }

@@ -87,7 +87,7 @@ fn start(w: Window, v: u32) -> u32 {
 
 // Whether the median changes a pixel with these flags.
 fn touched(flags: u32) -> bool {
-    return has_disparity(flags) && (params.all == 1u || (flags & FILLED) != 0u);
+    return has_disparity(flags) && (params.all == 1u || is_filled(flags));
 }
 
 // The disparity at `at` in steps of 2^`bits`, to the nearest.

@@ -13,6 +13,7 @@ use crate::front::{self, Prepared};
 use crate::image::Pair;
 use crate::maps::Maps;
 use crate::plan::Plan;
+use crate::prior::PriorUse;
 use crate::program::{Frame, Program, Step, View};
 use crate::watch::{Followed, Observer, Progress, Watch};
 use gathering::Gathering;
@@ -31,6 +32,8 @@ pub struct Solution {
     pub iterations: u32,
     /// The corrections that were made to the pair.
     pub conditioning: Conditioning,
+    /// What became of the prior, if there was one.
+    pub prior: Option<PriorUse>,
     /// The host steps around the stages, each with its time.
     pub host_times: Vec<(&'static str, Duration)>,
     /// The time of every stage that ran on the merged maps of all tiles.
@@ -126,6 +129,7 @@ impl MatchRun {
             maps: gathering.maps.expect("a list that collects maps"),
             iterations: running.earlier_iterations + running.most_iterations,
             conditioning: source.conditioning,
+            prior: source.used(),
             host_times: followed.times,
             mosaic_times: gathering.times,
             traffic: running.traffic,
@@ -179,6 +183,7 @@ impl MatchRun {
         match step {
             Step::Condition => source.condition(original, plan, watch)?,
             Step::Correct(known) => source.correct(original, plan, known, watch)?,
+            Step::Know(prior) => source.know(&prior, plan, watch)?,
             Step::Double => {
                 source.double(original, watch)?;
                 gathering.put_aside();
@@ -217,7 +222,8 @@ impl MatchRun {
             Step::EndOfPhase => {}
             Step::Mosaic(frame) => {
                 gathering.whole = frame;
-                gathering.mosaic = Some(Mosaic::new(&program.frames[frame].plan, source.pair())?);
+                gathering.mosaic =
+                    Some(Mosaic::new(&program.frames[frame].plan, source.pair(), source.anchors())?);
             }
             Step::Place(view) => {
                 if view == View::Left {
@@ -257,7 +263,8 @@ impl MatchRun {
         watch.followed.tile = entered.tile;
         let pair = source.enter(entered)?;
         backend.release();
-        let prepared = front::prepare(pair, &entered.plan, watch)?;
+        let mut prepared = front::prepare(pair, &entered.plan, watch)?;
+        prepared.prior = source.prior_of(entered);
         source.part = gathering.mosaic.is_some().then(|| prepared.pair.clone());
         Ok(prepared)
     }

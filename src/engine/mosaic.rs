@@ -22,21 +22,23 @@ pub(super) struct Mosaic {
 }
 
 impl Mosaic {
-    /// Empty maps for a match of `pair` by `plan`, the plan for the whole image.
+    /// Empty maps for a match of `pair` by `plan`, the plan for the whole image, with the anchors of a prior.
     ///
     /// # Errors
     /// [`Error::Memory`] when the machine cannot hold them, and [`Error::Mismatch`] when the plan is for another size.
-    pub(super) fn new(plan: &Plan, pair: &Pair) -> Result<Self> {
+    pub(super) fn new(plan: &Plan, pair: &Pair, anchors: Option<Plane<i32>>) -> Result<Self> {
         if plan.size() != pair.size() {
             let (plan, pair) = (plan.size(), pair.size());
             return Err(Error::Mismatch(format!("a plan for {plan:?} and a pair of {pair:?}")));
         }
         memory::check(plan.mosaic_bytes(), Purpose::Match)?;
         let (width, height) = plan.size();
+        let empty = MapSet::new(plan);
         let maps = MapSet {
+            anchors: anchors.unwrap_or_else(|| empty.anchors.clone()),
             right: Plane::filled(width, height, NO_LABEL),
             right_best: Plane::filled(width, height, u16::MAX),
-            ..MapSet::new(plan)
+            ..empty
         };
         let wanted = plan.method.refinement.right_map;
         let right_raw = if wanted { Plane::filled(width, height, 0) } else { Plane::filled(0, 0, 0) };

@@ -3,10 +3,13 @@
 use crate::error::{Purpose, Result};
 use crate::front;
 use crate::front::conditioning::Conditioning;
-use crate::image::Pair;
+use crate::front::prior::ReadyPrior;
+use crate::image::{Pair, Plane};
 use crate::memory;
 use crate::plan::Plan;
+use crate::prior::{Prior, PriorUse};
 use crate::program::Frame;
+use crate::stage::prior::LevelPriors;
 use crate::watch::Watch;
 
 /// The pair that is matched, and the part of it that the backend holds.
@@ -19,6 +22,8 @@ pub(super) struct Source {
     pub(super) conditioning: Conditioning,
     /// Whether the pair is at twice its size.
     pub(super) is_double: bool,
+    /// What is known of the scene.
+    prior: Option<ReadyPrior>,
 }
 
 impl Source {
@@ -46,7 +51,40 @@ impl Source {
     pub(super) fn double(&mut self, original: &Pair, watch: &mut Watch<'_>) -> Result<()> {
         let doubled = watch.host("double_size", || front::doubled(original, &self.conditioning))?;
         (self.pair, self.is_double) = (Some(doubled), true);
+        self.prior = self.prior.take().map(|ready| ready.with(ready.known.doubled()));
         Ok(())
+    }
+
+    /// Prepares a `prior` of the scene, of the size of the original pair.
+    pub(super) fn know(&mut self, prior: &Prior, plan: &Plan, watch: &mut Watch<'_>) -> Result<()> {
+        let pair = self.pair();
+        let ready = watch.host("prior", || {
+            let halved = plan.full.is_some().then(|| prior.halved());
+            Ok(ReadyPrior::new(halved.as_ref().unwrap_or(prior), pair, plan.range))
+        })?;
+        self.prior = Some(ready);
+        Ok(())
+    }
+
+    /// What is known of the pixels of `frame`, in the labels of its levels.
+    pub(super) fn prior_of(&self, frame: &Frame) -> Option<LevelPriors> {
+        let ready = self.prior.as_ref().filter(|_| frame.plan.prior)?;
+        if frame.tile.is_none() && !frame.mirrored {
+            return Some(front::prior::levels(ready, &frame.plan));
+        }
+        let crop = ready.known.crop(&frame.crop);
+        let known = if frame.mirrored { crop.mirrored() } else { crop };
+        Some(front::prior::levels(&ready.with(known), &frame.plan))
+    }
+
+    /// The anchors of the whole image, if a prior gives any.
+    pub(super) fn anchors(&self) -> Option<Plane<i32>> {
+        self.prior.as_ref().map(front::prior::anchors)
+    }
+
+    /// What became of the prior.
+    pub(super) fn used(&self) -> Option<PriorUse> {
+        self.prior.as_ref().map(|ready| ready.used)
     }
 
     pub(super) fn pair(&self) -> &Pair {

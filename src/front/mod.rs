@@ -16,6 +16,7 @@ pub mod matches;
 mod paper;
 mod parts;
 mod prepared;
+pub(crate) mod prior;
 mod range;
 #[cfg(feature = "cameras")]
 mod unrectified;

@@ -3,6 +3,7 @@
 #[cfg(feature = "paper")]
 use super::{matches::SparseMatch, zones::Zones};
 use crate::image::{Pair, Plane};
+use crate::stage::prior::LevelPriors;
 
 /// Everything that a backend needs for a match.
 #[derive(Clone, Debug)]
@@ -11,6 +12,8 @@ pub struct Prepared {
     pub pair: Pair,
     /// First and last label index of each pixel, by level; empty where every label is allowed.
     pub label_ranges: Vec<Plane<[u16; 2]>>,
+    /// What is known of the scene; without it, a plan with a prior takes every label alike.
+    pub prior: Option<LevelPriors>,
     /// The source of the label ranges: texture zones and sparse matches.
     #[cfg(feature = "paper")]
     pub zones: Option<(Zones, Vec<SparseMatch>)>,
@@ -23,6 +26,7 @@ impl Prepared {
         Self {
             pair: pair.clone(),
             label_ranges: Vec::new(),
+            prior: None,
             #[cfg(feature = "paper")]
             zones: None,
         }

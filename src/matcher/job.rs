@@ -8,10 +8,12 @@ use crate::front::check;
 use crate::front::conditioning::Conditioning;
 use crate::image::{Pair, Rect};
 use crate::options::{DisparityRange, Method};
+use crate::prior::Prior;
 #[cfg(doc)]
 use crate::region::Region;
 use crate::watch::Progress;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The return value of a progress listener: nothing, or whether to go on.
@@ -47,6 +49,7 @@ pub struct Job<'a> {
     method: Option<&'a Method>,
     region: Option<Rect>,
     known: Option<Conditioning>,
+    prior: Option<Arc<Prior>>,
     cancel: Option<&'a AtomicBool>,
     listener: Option<Listener<'a>>,
     inspect: Option<Inspect<'a>>,
@@ -79,6 +82,7 @@ impl<'a> Job<'a> {
             method: None,
             region: None,
             known: None,
+            prior: None,
             cancel: None,
             listener: None,
             inspect: None,
@@ -100,6 +104,11 @@ impl<'a> Job<'a> {
     /// corrections. [`Matcher::run_all`](Matcher::run_all_async) does that by itself.
     pub fn conditioning(self, known: Conditioning) -> Self {
         Self { known: Some(known), ..self }
+    }
+
+    /// Takes what is known of the scene, for the left view. See [`Prior`].
+    pub fn prior(self, prior: impl Into<Arc<Prior>>) -> Self {
+        Self { prior: Some(prior.into()), ..self }
     }
 
     /// `listener` receives the progress as each stage begins. If the pair is matched [again](Search::AUTOMATIC), it
@@ -137,8 +146,19 @@ impl<'a> Job<'a> {
     /// # Errors
     /// The errors of `run`.
     pub async fn run_async(self) -> Result<Matched> {
-        let Self { matcher, pair, find, found, method, region, known, cancel, mut listener, mut inspect } =
-            self;
+        let Self {
+            matcher,
+            pair,
+            find,
+            found,
+            method,
+            region,
+            known,
+            prior,
+            cancel,
+            mut listener,
+            mut inspect,
+        } = self;
         let (width, height) = pair.size();
         let range = matcher.threads.run(width * height, async || find(pair)).await??;
         let own = matcher.method.clone();
@@ -152,7 +172,7 @@ impl<'a> Job<'a> {
         // An inspector sees a single match.
         let once = !found || inspector.is_some();
         let region = region.as_ref();
-        let request = Request { range, method, known };
+        let request = Request { range, method, known, prior: prior.as_ref() };
         let matched = matcher.solve_part(pair, region, request, &mut observer, inspector).await?;
         let matched = Matched { range_found: found, ..matched };
         let Some(wider) = check::wider(&matched.maps, range).filter(|_| !once) else { return Ok(matched) };

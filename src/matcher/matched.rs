@@ -9,6 +9,7 @@ use crate::image::Plane;
 use crate::maps::Maps;
 use crate::options::DisparityRange;
 use crate::plan::Plan;
+use crate::prior::PriorUse;
 use crate::program::tiles::Tiles;
 use crate::sigma::Sigma;
 use std::time::Duration;
@@ -23,6 +24,8 @@ pub struct Matched {
     pub iterations: u32,
     /// The corrections that were made to the pair before it was matched.
     pub conditioning: Conditioning,
+    /// What became of the [prior](crate::Job::prior), if there was one.
+    pub prior: Option<PriorUse>,
     /// The plan of the whole image; [`Plan::doubled`] is its plan at twice the size.
     #[doc(hidden)]
     pub plan: Plan,
@@ -73,6 +76,7 @@ impl Matched {
             maps: solution.maps,
             iterations: solution.iterations,
             conditioning: solution.conditioning,
+            prior: solution.prior,
             plan: tiles.whole().clone(),
             range_found: false,
             tiles: tiles.clone(),

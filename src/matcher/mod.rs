@@ -21,6 +21,7 @@ use crate::front::conditioning::Conditioning;
 use crate::image::{Pair, Rect};
 use crate::options::{DeviceChoice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
+use crate::prior::Prior;
 use crate::program::Program;
 use crate::program::tiles::Tiles;
 use crate::region::Region;
@@ -130,6 +131,7 @@ struct Request<'a> {
     method: &'a Method,
     /// Corrections that are not measured on the pair itself.
     known: Option<Conditioning>,
+    prior: Option<&'a Arc<Prior>>,
 }
 
 impl Matcher {
@@ -203,6 +205,11 @@ impl Matcher {
         let Some(part) = part else { return self.solve(pair, request, observer, inspector).await };
         let region = Region::new(part.clone(), pair.size(), request.range)?;
         let window = region.window_of(pair);
+        if let Some(prior) = request.prior {
+            fits(prior, pair)?;
+        }
+        let prior = request.prior.map(|prior| Arc::new(prior.crop(region.window())));
+        let request = Request { prior: prior.as_ref(), ..request };
         let matched = self.solve(&window, request, observer, inspector).await?;
         Ok(Matched { maps: region.maps_of(&matched.maps), ..matched })
     }
@@ -215,9 +222,13 @@ impl Matcher {
         observer: Observer<'_>,
         mut inspector: Option<Inspector<'_>>,
     ) -> Result<Matched> {
-        let Request { range, method, known } = request;
+        let Request { range, method, known, prior } = request;
         let (width, height) = pair.size();
-        let plan = Plan::new(width, height, range, method)?;
+        let plan = Plan::new(width, height, range, method)?.with_prior(prior.is_some());
+        if let Some(prior) = prior {
+            fits(prior, pair)?;
+        }
+        let input = (pair, known, prior);
         let tiles = Tiles::new(&plan)?;
         let needed = plan.bytes().div_ceil(1 << 20);
         if inspector.is_some() && needed > plan.method.tiles.memory.into() {
@@ -229,7 +240,7 @@ impl Matcher {
             let served = async || {
                 check(device, &plan.method, checked).await?;
                 let inspector = inspector.as_mut().map(|inspector| &mut **inspector as _);
-                timed(device, *timings, &tiles, (pair, known), &mut *observer, inspector).await
+                timed(device, *timings, &tiles, input, &mut *observer, inspector).await
             };
             match threads.run(width * height, served).await? {
                 Err(e) => note = Some(self.without_device(e)?),
@@ -239,7 +250,7 @@ impl Matcher {
         let Self { threads, cpus, given_up, timings, .. } = self;
         let note = note.or_else(|| given_up.clone());
         let mut cpu = cpus.pop().unwrap_or_default();
-        let served = async || timed(&mut cpu, *timings, &tiles, (pair, known), observer, inspector).await;
+        let served = async || timed(&mut cpu, *timings, &tiles, input, observer, inspector).await;
         let matched = threads.run(width * height, served).await;
         cpus.push(cpu);
         let matched = matched??;
@@ -263,17 +274,26 @@ impl Matcher {
     }
 }
 
-/// Matches a pair, with its corrections if they are known.
+/// Checks that `prior` has the size of `pair`.
+fn fits(prior: &Prior, pair: &Pair) -> Result<()> {
+    let ((w, h), (width, height)) = (prior.size(), pair.size());
+    if (w, h) == (width, height) {
+        return Ok(());
+    }
+    Err(Error::Mismatch(format!("the prior has {w} x {h} pixels, the left view {width} x {height}")))
+}
+
+/// Matches a pair, with its corrections and a prior of the scene if they are known.
 async fn timed(
     backend: &mut dyn Backend,
     timings: bool,
     tiles: &Tiles,
-    (pair, known): (&Pair, Option<Conditioning>),
+    (pair, known, prior): (&Pair, Option<Conditioning>, Option<&Arc<Prior>>),
     observer: Observer<'_>,
     inspector: Option<Inspector<'_>>,
 ) -> Result<Matched> {
     backend.keep_time(timings)?;
-    let program = Program::new(tiles)?.corrected(known);
+    let program = Program::new(tiles)?.corrected(known).knowing(prior.cloned());
     let solution = engine::solve(backend, &program, pair, observer, inspector).await?;
     let timings = if timings { summed(&solution, &backend.times().await?) } else { Vec::new() };
     Ok(Matched::new(backend, tiles, solution, timings))

@@ -88,7 +88,7 @@ impl Matcher {
             match started? {
                 (known, Some((tiles, started))) => last = Some(Flight { pair, range, known, tiles, started }),
                 (known, None) => {
-                    let request = Request { range, method, known };
+                    let request = Request { range, method, known, prior: None };
                     if take(self.solve(&pair, request, &mut *observer, None).await?).is_break() {
                         return Ok(());
                     }
@@ -149,7 +149,7 @@ impl Matcher {
                 Err(e) => self.without_device(e)?,
             };
         }
-        self.solve(&pair, Request { range, method, known }, observer, None).await
+        self.solve(&pair, Request { range, method, known, prior: None }, observer, None).await
     }
 }
 

@@ -47,7 +47,7 @@ pub(super) fn side_by_side(
             );
             cpu
         };
-        let matched = pollster::block_on(timed(&mut cpu, false, tiles, (pair, known), observer, None));
+        let matched = pollster::block_on(timed(&mut cpu, false, tiles, (pair, known, None), observer, None));
         locked(&cpus).push(cpu);
         Ok(Matched { note: given_up.clone(), ..matched? })
     };

@@ -3,8 +3,10 @@
 use crate::front::conditioning::Conditioning;
 use crate::image::Rect;
 use crate::plan::Plan;
+use crate::prior::Prior;
 use crate::stage::{Data, Stage, Volume};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A part of the pair that a backend matches at a time.
 #[derive(Clone, Debug, PartialEq)]
@@ -173,6 +175,8 @@ pub enum Step {
     Condition,
     /// Makes these corrections to the pair, instead of measuring them.
     Correct(Conditioning),
+    /// Prepares this prior of the scene, of the size of the pair.
+    Know(Arc<Prior>),
     /// Replaces the pair by the pair at twice its size.
     Double,
     /// Loads this frame into the backend; the stages that follow work on it.
@@ -245,6 +249,16 @@ impl Program {
                 .iter_mut()
                 .filter(|step| **step == Step::Condition)
                 .for_each(|step| *step = Step::Correct(known));
+        }
+        self
+    }
+
+    /// Adds the `prior` of the scene, if any, as soon as the pair is conditioned. The plans must [have](Plan::with_prior) one then.
+    #[must_use]
+    pub fn knowing(mut self, prior: Option<Arc<Prior>>) -> Self {
+        let conditions = |step: &Step| matches!(step, Step::Condition | Step::Correct(_));
+        if let Some((prior, at)) = prior.zip(self.steps.iter().position(conditions)) {
+            self.steps.insert(at + 1, Step::Know(prior));
         }
         self
     }

@@ -15,8 +15,10 @@ pub(crate) fn stages(plan: &Plan) -> Vec<Step> {
 /// Adds the right view to `steps`, after the request for the left maps: sub-pixel disparities, map stages.
 #[must_use]
 pub(crate) fn follow(plan: &Plan, mut steps: Vec<Step>) -> Vec<Step> {
-    let is_of_maps = |step: &&Step| step.stage().is_some_and(Stage::is_of_maps);
-    let refining: Vec<Step> = steps.iter().filter(is_of_maps).cloned().collect();
+    // Anchors are known in the left view alone.
+    let refines =
+        |step: &&Step| step.stage().is_some_and(|stage| stage.is_of_maps() && stage != Stage::Anchor);
+    let refining: Vec<Step> = steps.iter().filter(refines).cloned().collect();
     let collect = steps.pop();
     steps.extend(stages(plan));
     steps.extend(refining);
@@ -39,7 +41,7 @@ mod tests {
         let (left, right) = steps.split_at(plain.len() - 1);
         assert_eq!(left, &plain[..plain.len() - 1]);
         let mut expected = stages(&plan);
-        expected.extend(schedule::post_processing(&plan.method));
+        expected.extend(schedule::post_processing(&plan));
         expected.extend([Step::Ask(View::Right), Step::Collect]);
         assert_eq!(right, expected);
     }

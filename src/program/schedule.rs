@@ -1,7 +1,7 @@
 //! The schedule: levels, iterations, convergence and the order of stages are decided here only.
 
 use super::{Run, Step};
-use crate::options::{Method, Order};
+use crate::options::Order;
 use crate::plan::{Phase, Plan};
 use crate::program::View;
 use crate::stage::Stage;
@@ -12,7 +12,7 @@ use std::iter;
 pub(crate) fn steps(plan: &Plan) -> Vec<Step> {
     let mut steps = vec![Step::Condition, Step::Enter(0)];
     steps.extend(estimate(plan));
-    steps.extend(post_processing(&plan.method));
+    steps.extend(post_processing(plan));
     steps.extend([Step::Ask(View::Left), Step::Collect]);
     steps
 }
@@ -36,18 +36,19 @@ pub(crate) fn estimate(plan: &Plan) -> Vec<Step> {
     steps
 }
 
-/// The steps when level `z` joins the flooding: they set its labels and their evidence.
+/// The steps when level `z` of `plan` joins the flooding: they set its labels and their evidence.
 #[must_use]
-pub fn join(z: usize) -> Vec<Step> {
-    vec![Step::of(Stage::LabelWindow(z)), Step::of(Stage::Evidence(z))]
+pub fn join(plan: &Plan, z: usize) -> Vec<Step> {
+    let prior = plan.prior.then_some(Stage::Prior(z));
+    [Stage::LabelWindow(z), Stage::Evidence(z)].into_iter().chain(prior).map(Step::of).collect()
 }
 
 /// The flooding of `plan`; `join` returns the steps for each level that joins, coarsest first.
-pub fn flood(plan: &Plan, join: impl Fn(usize) -> Vec<Step>) -> Vec<Step> {
+pub fn flood(plan: &Plan, join: impl Fn(&Plan, usize) -> Vec<Step>) -> Vec<Step> {
     let mut steps = Vec::new();
     let mut joined = plan.levels.len();
     for phase in &plan.phases {
-        steps.extend((phase.finest..joined).rev().flat_map(&join));
+        steps.extend((phase.finest..joined).rev().flat_map(|z| join(plan, z)));
         joined = phase.finest;
         steps.extend(joining(plan, phase).map(Step::of));
         let may_settle = plan.settled_change().is_some() && phase.finest == 0;
@@ -92,10 +93,10 @@ fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> 
     (finest + 1..=exchanged).map(Stage::Resolution).chain((finest..=flooded).map(Stage::Flood))
 }
 
-/// The map stages that the method uses, in the order of the table.
+/// The map stages that `plan` uses, in the order of the table.
 #[must_use]
-pub(crate) fn post_processing(method: &Method) -> Vec<Step> {
-    let taken = Stage::OF_MAPS.iter().filter(|stage| stage.is_taken(method));
+pub(crate) fn post_processing(plan: &Plan) -> Vec<Step> {
+    let taken = Stage::OF_MAPS.iter().filter(|stage| stage.is_taken(plan));
     taken.copied().map(Step::of).collect()
 }
 

@@ -96,7 +96,7 @@ mod tests {
                     assert_eq!(steps.next(), Some(&Step::Place(View::Right)));
                 }
             }
-            let post = schedule::post_processing(&plan.method);
+            let post = schedule::post_processing(&plan);
             let mut expected = vec![Step::Gather];
             expected.extend_from_slice(&post);
             expected.extend([Step::Ask(View::Left), Step::of(Stage::SwapViews), Step::PlaceRight]);

@@ -35,6 +35,8 @@ pub enum Data {
     Candidates(usize),
     /// First and last label of each pixel of a level.
     LabelRange(usize),
+    /// The prior of each pixel of a level: its interval, slope and cap.
+    Prior(usize),
     /// The right view.
     Right,
     /// The left view as uploaded in whole 8-bit levels: one word per pixel.
@@ -285,6 +287,7 @@ impl Data {
             Self::FullWindows(z) => windows("full_windows", z).starting(Constant),
             Self::Candidates(z) => level("candidates", z, 1),
             Self::LabelRange(z) => level("label_range", z, 1).starting(Given),
+            Self::Prior(z) => level("prior", z, 2).starting(Given),
             Self::Right => fine("right", 4).starting(Given),
             Self::LeftWords => fine("left_words", 1).starting(Given).place(Place::In(Self::NextDisparity)),
             Self::RightWords => fine("right_words", 1).starting(Given).place(Place::In(Self::NextFlags)),
@@ -300,6 +303,7 @@ impl Data {
             Self::Map(Map::RightLabel | Map::RightBest) => fine("right_labels", 1),
             Self::Map(Map::Raw) => fine("raw", 1),
             Self::Map(Map::Disparity) => fine("disparity", 1),
+            Self::Map(Map::Anchor) => fine("anchors", 1).starting(Given),
             Self::Map(Map::Validity | Map::Confidence) => fine("flags", 1),
             Self::NextDisparity => fine("next_disparity", 1),
             Self::NextFlags => fine("next_flags", 1),
@@ -368,7 +372,8 @@ impl Data {
             | Self::Windows(z)
             | Self::FullWindows(z)
             | Self::Candidates(z)
-            | Self::LabelRange(z) => Some(z),
+            | Self::LabelRange(z)
+            | Self::Prior(z) => Some(z),
             _ => None,
         }
     }
@@ -391,12 +396,13 @@ impl Data {
 
     /// All other data of a level.
     #[must_use]
-    pub fn of_level(z: usize) -> [Self; 5] {
+    pub fn of_level(z: usize) -> [Self; 6] {
         [
             Self::Volume(Volume::Cost(z)),
             Self::FullWindows(z),
             Self::Candidates(z),
             Self::LabelRange(z),
+            Self::Prior(z),
             Self::NextGuide(z),
         ]
     }
@@ -404,7 +410,7 @@ impl Data {
     /// All data that belong to no level.
     #[must_use]
     pub fn of_match() -> Vec<Self> {
-        let maps = Map::MATCHED.into_iter().chain(Map::FULL).map(Self::Map);
+        let maps = Map::MATCHED.into_iter().chain([Map::Anchor]).chain(Map::FULL).map(Self::Map);
         let others = [
             Self::Right,
             Self::LeftCensus,
@@ -470,6 +476,8 @@ impl Data {
             Self::Volume(volume) => volume.is_there(levels),
             Self::NextGuide(z) | Self::Candidates(z) => (1..levels).contains(&z),
             Self::LabelRange(z) => z < levels && plan.limits_labels(),
+            Self::Prior(z) => z < levels && plan.prior,
+            Self::Map(Map::Anchor) => plan.prior,
             Self::LeftWords | Self::RightWords => plan.full.is_none(),
             Self::FullLeft
             | Self::FullRight

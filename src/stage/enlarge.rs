@@ -47,7 +47,7 @@ pub(super) const ROW: Descriptor = Descriptor {
         [maps, vec![Data::LEFT, Data::FullLeft]].concat()
     },
     writes: |_| maps(&Map::FULL),
-    taken: |method| method.schedule.match_size == MatchSize::Half,
+    taken: |plan| plan.method.schedule.match_size == MatchSize::Half,
     pixel: 60.0,
     ..Descriptor::NONE
 };

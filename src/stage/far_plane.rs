@@ -96,7 +96,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     },
     writes: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
     needs: |_| vec![Data::Patches],
-    taken: patches::are_taken,
+    taken: |plan| patches::are_taken(&plan.method),
     pixel: 8.0,
     ..Descriptor::NONE
 };

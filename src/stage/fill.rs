@@ -19,7 +19,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Disparity, Map::Validity]),
     writes: |_| maps(&[Map::Disparity, Map::Validity]),
     needs: |_| vec![Data::KnownRows, Data::SourceRows, Data::NextDisparity, Data::NextFlags],
-    taken: |method| method.refinement.fill != Fill::None,
+    taken: |plan| plan.method.refinement.fill != Fill::None,
     pixel: 4.0,
     ..Descriptor::NONE
 };

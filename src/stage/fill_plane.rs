@@ -18,7 +18,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| [maps(&[Map::Disparity, Map::Validity]), vec![Data::LEFT, Data::FillWeights]].concat(),
     writes: |_| maps(&[Map::Disparity]),
     needs: |_| vec![Data::NextDisparity],
-    taken: votes::are_taken,
+    taken: |plan| votes::are_taken(&plan.method),
     pixel: 48.0,
     ..Descriptor::NONE
 };

@@ -5,6 +5,9 @@ use crate::plan::Plan;
 /// Marks pixels of the right view to which no left pixel projects.
 pub const NO_LABEL: u16 = u16::MAX;
 
+/// Marks pixels of which a prior says too little to take its disparity.
+pub const NO_ANCHOR: i32 = i32::MIN;
+
 /// Stands for "no runner-up".
 pub(crate) const NO_RUNNER_UP: u16 = u16::MAX;
 
@@ -29,6 +32,8 @@ pub enum Map {
     Validity,
     /// Confidence, 0 ..= 255.
     Confidence,
+    /// Disparity that a prior gives where no match can be trusted, in 1/256 px; [`NO_ANCHOR`] where it gives none.
+    Anchor,
     /// [`Self::Raw`] at full size, if the pair is matched at half its size.
     FullRaw,
     /// [`Self::Disparity`] at full size.
@@ -40,7 +45,7 @@ pub enum Map {
 }
 
 impl Map {
-    /// Every map of the size of the finest level.
+    /// Every map of the size of the finest level that a match computes.
     pub const MATCHED: [Self; 9] = [
         Self::Label,
         Self::Best,
@@ -61,7 +66,8 @@ impl Map {
     #[must_use]
     pub fn all(plan: &Plan) -> Vec<Self> {
         let full: &[Self] = if plan.full.is_some() { &Self::FULL } else { &[] };
-        [&Self::MATCHED, full].concat()
+        let prior: &[Self] = if plan.prior { &[Self::Anchor] } else { &[] };
+        [&Self::MATCHED, prior, full].concat()
     }
 
     /// Words per pixel of the device array that holds this map, shared with other maps.

@@ -1,7 +1,8 @@
 //! All maps of a match in progress, from the labels on.
 
 use super::Map;
-use super::map::NO_RUNNER_UP;
+use super::map::{NO_ANCHOR, NO_RUNNER_UP};
+use super::prior::{LabelPrior, LevelPriors};
 use crate::image::{Plane, Rect};
 use crate::maps::Maps;
 use crate::plan::Plan;
@@ -17,6 +18,8 @@ pub(crate) struct MapSet {
     pub(crate) disparity: Plane<i32>,
     pub(crate) validity: Plane<u8>,
     pub(crate) confidence: Plane<u8>,
+    /// [`Map::Anchor`]; empty without a prior.
+    pub(crate) anchors: Plane<i32>,
     /// The maps at full size, in whole blocks of 2 x 2 pixels; empty if the pair is matched at full size.
     pub(crate) full: Maps,
 }
@@ -40,8 +43,10 @@ impl MapSet {
             validity: Plane::filled(full_width, full_height, 0),
             right: None,
         };
+        let anchored = if plan.prior { (width, height) } else { (0, 0) };
         Self {
             full,
+            anchors: Plane::filled(anchored.0, anchored.1, NO_ANCHOR),
             optima: Plane::filled(width, height, Optimum::default()),
             right: Plane::filled(width, height, 0),
             right_best: Plane::filled(width, height, 0),
@@ -78,6 +83,7 @@ impl MapSet {
             Map::Disparity => self.disparity.clone(),
             Map::Validity => self.validity.map(|&v| v.into()),
             Map::Confidence => self.confidence.map(|&v| v.into()),
+            Map::Anchor => self.anchors.clone(),
             Map::FullRaw => self.full.raw.clone(),
             Map::FullDisparity => self.full.disparity.clone(),
             Map::FullValidity => self.full.validity.map(|&v| v.into()),
@@ -112,11 +118,22 @@ impl MapSet {
             Map::Disparity => put(&mut self.disparity, from, |old, v| *old = v),
             Map::Validity => put(&mut self.validity, from, |old, v| *old = v as u8),
             Map::Confidence => put(&mut self.confidence, from, |old, v| *old = v as u8),
+            Map::Anchor => put(&mut self.anchors, from, |old, v| *old = v),
             Map::FullRaw => put(&mut self.full.raw, from, |old, v| *old = v),
             Map::FullDisparity => put(&mut self.full.disparity, from, |old, v| *old = v),
             Map::FullValidity => put(&mut self.full.validity, from, |old, v| *old = v as u8),
             Map::FullConfidence => put(&mut self.full.confidence, from, |old, v| *old = v as u8),
         }
+    }
+
+    /// Takes the anchors of a prior, if there is one, and returns its levels.
+    pub(crate) fn take_prior(&mut self, prior: Option<LevelPriors>) -> Vec<Plane<LabelPrior>> {
+        self.anchors.data_mut().fill(NO_ANCHOR);
+        let Some(LevelPriors { levels, anchors }) = prior.filter(|_| !self.anchors.data().is_empty()) else {
+            return Vec::new();
+        };
+        self.anchors = anchors;
+        levels
     }
 
     /// Exchanges the labels of the two views, mirrored.

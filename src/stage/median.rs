@@ -22,7 +22,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| [maps(&[Map::Disparity, Map::Validity]), vec![Data::LEFT, Data::MedianWeights]].concat(),
     writes: |_| maps(&[Map::Disparity]),
     needs: |_| vec![Data::NextDisparity],
-    taken: |method| method.refinement.median != Median::Off && !method.refinement.plane,
+    taken: |plan| plan.method.refinement.median != Median::Off && !plan.method.refinement.plane,
     pixel: 60.0,
     ..Descriptor::NONE
 };

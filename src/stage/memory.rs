@@ -1,5 +1,6 @@
 //! The memory of a match: upper bounds.
 
+use super::prior::LabelPrior;
 use super::{Data, Extent, Place, Start};
 use crate::plan::votes::Votes;
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan, RING_PART, ROW_ALIGN};
@@ -58,7 +59,8 @@ impl Plan {
             l.height * (2 * l.width + 24 * (l.width + 2 * l.stride))
         };
         // The member codes, the transposed table with its row starts, and the guide.
-        let on_host = l.width * (self.neighbours + 4 * self.slots() + 4 + 9);
+        let prior = if self.prior { size_of::<LabelPrior>() } else { 0 };
+        let on_host = l.width * (self.neighbours + 4 * self.slots() + 4 + 9 + prior);
         // A device needs less for these, but also keeps candidates and label ranges.
         let of_level = Data::of_levels(level).into_iter().chain(Data::of_level(level));
         let graph = of_level.filter(|data| match data {
@@ -119,7 +121,9 @@ impl Plan {
     pub fn front_bytes(&self) -> u64 {
         let corrected = if self.method.front.corrects_illumination() { 66 } else { 0 };
         let zones = if self.limits_labels() { 200 } else { 0 };
-        (corrected + zones) * self.levels[0].pixels() as u64
+        // Known disparities with their standard deviations, given and spread, and colours.
+        let prior = if self.prior { 2 * 6 + 12 } else { 0 };
+        (corrected + zones + prior) * self.levels[0].pixels() as u64
     }
 
     /// Bytes of the half-size pair with its full size in whole blocks, if the pair is matched at half size.
@@ -157,7 +161,8 @@ impl Plan {
         let full = if self.full.is_some() { 4 * 2 * 10 } else { 0 };
         // The host frees the votes before it carries planes.
         let filling = self.vote_bytes().max(self.patch_bytes());
-        (20 + 12 + corrected + right + full) * self.levels[0].pixels() as u64 + filling
+        let anchors = if self.prior { 4 } else { 0 };
+        (20 + 12 + corrected + right + full + anchors) * self.levels[0].pixels() as u64 + filling
     }
 
     /// Bytes of all volumes, graphs and maps.

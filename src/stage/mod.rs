@@ -11,12 +11,11 @@ mod map_set;
 mod memory;
 mod volume;
 
-use crate::options::Method;
 use crate::plan::Plan;
 pub(crate) use data::{Array, Extent, Place};
 pub use data::{Data, Start};
 pub(crate) use map::NO_RUNNER_UP;
-pub use map::{Map, NO_LABEL};
+pub use map::{Map, NO_ANCHOR, NO_LABEL};
 pub(crate) use map_set::{MapSet, Optimum};
 pub(crate) use volume::PaddedRows;
 pub use volume::{Volume, volume_shape};
@@ -31,13 +30,13 @@ macro_rules! for_every_stage {
             levels {
                 Graph graph; Pyramid pyramid; LabelRange label_range; LabelWindow label_window; Flood flood;
             }
-            level_rows { Evidence evidence; Dependency dependency; Resolution resolution; Belief belief; }
+            level_rows { Evidence evidence; Prior prior; Dependency dependency; Resolution resolution; Belief belief; }
             finest { Cost cost; Change change; Refine refine; SwapViews swap_views; MirrorLabels mirror_labels; }
             finest_rows { WinnerTakesAll winner_takes_all; RightView right_view; SubPixel sub_pixel; }
             maps {
-                LeftRightCheck left_right_check; SpeckleFilter speckle_filter; Confidence confidence; Fill fill;
-                VoteFill vote_fill; FillPlane fill_plane; Median median; Plane plane; Support support; FarPlane far_plane;
-                Enlarge enlarge;
+                LeftRightCheck left_right_check; SpeckleFilter speckle_filter; Confidence confidence; Anchor anchor;
+                Fill fill; VoteFill vote_fill; FillPlane fill_plane; Median median; Plane plane; Support support;
+                FarPlane far_plane; Enlarge enlarge;
             }
         }
     };
@@ -56,8 +55,8 @@ pub struct Descriptor {
     pub reach: Option<usize>,
     /// Whether it may run at several levels at once, because no level depends on its results at another.
     pub joins: bool,
-    /// Whether a match by this method uses it. Only consulted for map stages.
-    pub taken: fn(&Method) -> bool,
+    /// Whether a match by this plan uses it. Only consulted for map stages.
+    pub taken: fn(&Plan) -> bool,
     /// Approximate time on one thread, in ns per pixel of its level.
     pub pixel: f64,
     /// Additional time in ns per cell (label of a pixel) of its level.
@@ -120,6 +119,7 @@ macro_rules! define {
                 let is_there = |stage: &Self| match stage {
                     Self::Pyramid(z) | Self::Resolution(z) => *z > 0,
                     Self::LabelRange(_) => plan.limits_labels(),
+                    Self::Prior(_) | Self::Anchor => plan.prior,
                     Self::Refine | Self::Enlarge => plan.full.is_some(),
                     _ => true,
                 };
@@ -205,10 +205,10 @@ impl Stage {
         data(self.level().unwrap_or(0)).into_iter().filter(|data| data.is_there(plan))
     }
 
-    /// Whether a match by `method` uses it. Only called for map stages.
+    /// Whether a match by `plan` uses it. Only called for map stages.
     #[must_use]
-    pub fn is_taken(self, method: &Method) -> bool {
-        (self.descriptor().taken)(method)
+    pub fn is_taken(self, plan: &Plan) -> bool {
+        (self.descriptor().taken)(plan)
     }
 
     /// The volumes that it reads or writes, repeated for each use.

@@ -18,7 +18,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Label, Map::Best, Map::RunnerUp, Map::Validity]),
     writes: |_| maps(&[Map::Validity]),
     needs: |_| vec![Data::Parents, Data::Sizes],
-    taken: |method| method.refinement.speckle_size > 0,
+    taken: |plan| plan.method.refinement.speckle_size > 0,
     pixel: 15.0,
     ..Descriptor::NONE
 };

@@ -80,7 +80,7 @@ pub(super) const ROW: Descriptor = Descriptor {
     },
     writes: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
     needs: |_| vec![Data::Shown, Data::HalfColours, Data::Elected, Data::Sums, Data::Totals],
-    taken: votes::are_taken,
+    taken: |plan| votes::are_taken(&plan.method),
     pixel: 60.0,
     ..Descriptor::NONE
 };

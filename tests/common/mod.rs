@@ -42,7 +42,7 @@ pub fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, graphs: &[Le
 
 /// Runs the message passing of `plan` on the evidence in `backend`; returns the number of iterations.
 pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
-    run(backend, &schedule::flood(plan, |_| Vec::new()))
+    run(backend, &schedule::flood(plan, |_, _| Vec::new()))
 }
 
 /// Like [`flood`], from the costs in `backend`.

@@ -459,7 +459,12 @@ fn flags(random: &mut Random, width: usize, height: usize, filled: bool) -> Plan
     let density = random.pick(&[1, 2, 3, 10, 1000]);
     Plane::from_fn(width, height, |x, y| {
         let validity = if !random.one_in(density) {
-            random.pick(&[0, 0, flag::LOW_CONFIDENCE])
+            if filled {
+                // FILLED alone marks what a prior decided.
+                random.pick(&[0, 0, flag::LOW_CONFIDENCE, flag::FILLED])
+            } else {
+                random.pick(&[0, 0, flag::LOW_CONFIDENCE])
+            }
         } else if random.one_in(6) {
             flag::MASKED
         } else {

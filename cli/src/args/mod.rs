@@ -3,6 +3,7 @@
 mod cameras;
 mod execution;
 mod method;
+mod prior;
 mod reading;
 pub(crate) mod recording;
 mod rectification;
@@ -13,6 +14,7 @@ mod sign;
 pub(crate) use cameras::CameraArgs;
 pub(crate) use execution::{ExecutionArgs, ThreadArgs};
 pub(crate) use method::MethodArgs;
+pub(crate) use prior::PriorArgs;
 pub(crate) use reading::{ReadingArgs, disparity, scale};
 pub(crate) use recording::{RecordingArgs, Topics};
 pub(crate) use rectification::{RectificationArgs, shown};

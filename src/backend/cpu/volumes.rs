@@ -11,6 +11,7 @@ use crate::graph::LevelGraph;
 use crate::image::{Image, Pair, Plane};
 use crate::plan::Plan;
 use crate::program::{Sent, SentMessages};
+use crate::stage::prior::LabelPrior;
 use crate::stage::{Data, MapSet, Volume};
 use std::mem;
 
@@ -27,6 +28,8 @@ pub(super) struct Volumes<U> {
     pub(super) messages: SentMessages,
     /// First and last label of each pixel, by level; empty if all labels are allowed.
     pub(super) label_ranges: Vec<Plane<[u16; 2]>>,
+    /// The prior of each pixel, by level; empty without one.
+    pub(super) priors: Vec<Plane<LabelPrior>>,
     /// The label map of the last [`Stage::Change`](crate::backend::Stage::Change), then the sum of squared
     /// changes, and whether the map has settled.
     pub(super) labels: Vec<u16>,
@@ -56,7 +59,7 @@ pub(super) struct Level<U> {
 
 impl<U: Units> Volumes<U> {
     pub(super) fn new(plan: &Plan, prepared: Prepared) -> Result<Self> {
-        let Prepared { pair, label_ranges, .. } = prepared;
+        let Prepared { pair, label_ranges, prior, .. } = prepared;
         let last = plan.levels.len() - 1;
         let levels = plan
             .levels
@@ -83,9 +86,10 @@ impl<U: Units> Volumes<U> {
             .collect::<Result<_>>()?;
         let fine = &plan.levels[0];
         let fine_cost = Pages::new(if plan.stores_costs() { fine.pixels() * fine.stride } else { 0 })?;
-        let maps = MapSet::new(plan);
+        let mut maps = MapSet::new(plan);
+        let priors = maps.take_prior(prior);
         let of_maps = Self::of_maps(plan, pair, maps);
-        Ok(Self { fine_cost, levels, label_ranges, labels: vec![0; fine.pixels()], ..of_maps })
+        Ok(Self { fine_cost, levels, label_ranges, priors, labels: vec![0; fine.pixels()], ..of_maps })
     }
 
     /// Maps without volumes.
@@ -98,6 +102,7 @@ impl<U: Units> Volumes<U> {
             levels: Vec::new(),
             messages: SentMessages::none(plan.levels.len()),
             label_ranges: Vec::new(),
+            priors: Vec::new(),
             labels: Vec::new(),
             change: None,
             settled: false,
@@ -105,9 +110,9 @@ impl<U: Units> Volumes<U> {
         }
     }
 
-    /// Frees graphs, guides and label ranges.
+    /// Frees graphs, guides, label ranges and priors.
     pub(super) fn release(&mut self) {
-        self.label_ranges = Vec::new();
+        (self.label_ranges, self.priors) = (Vec::new(), Vec::new());
         for level in &mut self.levels {
             (level.graph, level.guide) = (LevelGraph::default(), None);
         }
@@ -134,9 +139,10 @@ impl<U: Units> Volumes<U> {
 
     /// Resets everything to the state after [`Self::new`], for another pair whose plan fits.
     pub(super) fn reset(&mut self, plan: &Plan, prepared: Prepared) {
-        let Prepared { pair, label_ranges, .. } = prepared;
+        let Prepared { pair, label_ranges, prior, .. } = prepared;
         self.plan = plan.clone();
         (self.pair, self.label_ranges) = (pair, label_ranges);
+        self.priors = self.maps.take_prior(prior);
         self.labels.fill(0);
         (self.change, self.settled) = (None, false);
         self.messages = SentMessages::none(plan.levels.len());

@@ -39,7 +39,8 @@ use crate::memory;
 use crate::plan::{LevelPlan, Plan};
 use crate::program::schedule::split;
 use crate::program::{Program, Run, Sent, SentMessages, joined, sharing, together};
-use crate::stage::Data;
+use crate::stage::prior::LabelPrior;
+use crate::stage::{Data, NO_ANCHOR};
 pub(crate) use adapters::has_automatic_async;
 pub use adapters::may_have_gpu;
 #[cfg(not(target_arch = "wasm32"))]
@@ -62,7 +63,7 @@ use std::time::Duration;
 use timer::Timer;
 pub use uniform::UniformLayout;
 use uniform::full_pitch;
-use words::{full_words, image_words, label_range_words, narrow_words};
+use words::{anchor_words, full_words, image_words, label_range_words, narrow_words, prior_words};
 
 /// The GPU path on one device.
 pub struct Gpu {
@@ -259,7 +260,7 @@ impl Gpu {
         Ok(state)
     }
 
-    /// Uploads the pair and its label ranges.
+    /// Uploads the pair, its label ranges and its prior.
     fn load(&mut self, state: &mut State, prepared: &Prepared) -> Result<()> {
         self.reset(state)?;
         let State { plan, buffers, words, .. } = state;
@@ -288,6 +289,17 @@ impl Gpu {
             let all = || words(&Plane::filled(l.width, l.height, [0, l.labels as u16 - 1]));
             array(Data::LabelRange(z))
                 .write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
+        }
+        for (z, l) in plan.levels.iter().enumerate().filter(|_| plan.prior) {
+            let words = |prior: &Plane<_>| prior_words(prior, l.labels, &buffers.levels[z]);
+            let nothing = || words(&Plane::filled(l.width, l.height, LabelPrior::default()));
+            let levels = prepared.prior.as_ref().map(|prior| words(&prior.levels[z]));
+            array(Data::Prior(z)).write(device, &levels.unwrap_or_else(nothing))?;
+        }
+        if plan.prior {
+            let none = || Plane::filled(plan.levels[0].width, plan.levels[0].height, NO_ANCHOR);
+            let anchors = prepared.prior.as_ref().map_or_else(none, |prior| prior.anchors.clone());
+            array(Data::Map(Map::Anchor)).write(device, &anchor_words(&anchors, pitch))?;
         }
         if narrow {
             self.unpack(state, Unpacking::default())?;

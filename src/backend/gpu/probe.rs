@@ -206,7 +206,7 @@ impl Gpu {
             Map::Label | Map::RightLabel => (0, 0, 0xffff),
             Map::Best | Map::RightBest => (0, 16, 0xffff),
             Map::RunnerUp => (1, 0, 0xffff),
-            Map::Raw | Map::Disparity | Map::FullRaw | Map::FullDisparity => (0, 0, u32::MAX),
+            Map::Raw | Map::Disparity | Map::Anchor | Map::FullRaw | Map::FullDisparity => (0, 0, u32::MAX),
             Map::Validity | Map::FullValidity => (0, 0, 0xff),
             Map::Confidence | Map::FullConfidence => (0, 8, 0xff),
         };

@@ -3,6 +3,7 @@
 
 use super::uniform::LevelParams;
 use crate::image::{Image, Pixel, Plane};
+use crate::stage::prior::LabelPrior;
 use crate::threads::prelude::*;
 
 /// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, to `words`. Returns false if that
@@ -65,6 +66,26 @@ pub(super) fn label_range_words(label_ranges: &Plane<[u16; 2]>, params: &LevelPa
         for (word, &[first, last]) in row.iter_mut().zip(label_ranges.row(y)) {
             *word = u32::from(first) | u32::from(last) << 16;
         }
+    }
+    words
+}
+
+/// The prior of each pixel of a level with `labels` labels, in two words.
+pub(super) fn prior_words(prior: &Plane<LabelPrior>, labels: usize, params: &LevelParams) -> Vec<u32> {
+    let pitch = 2 * params.pixel_pitch as usize;
+    let mut words = vec![0; pitch * prior.height()];
+    words.par_chunks_exact_mut(pitch).enumerate().for_each(|(y, row)| {
+        let pixels = row.as_chunks_mut().0.iter_mut().zip(prior.row(y));
+        pixels.for_each(|(words, prior)| *words = prior.words(labels));
+    });
+    words
+}
+
+/// The anchors, one word per pixel.
+pub(super) fn anchor_words(anchors: &Plane<i32>, pitch: u32) -> Vec<u32> {
+    let mut words = vec![0; pitch as usize * anchors.height()];
+    for (y, row) in words.chunks_exact_mut(pitch as usize).enumerate() {
+        row.iter_mut().zip(anchors.row(y)).for_each(|(word, anchor)| *word = anchor.cast_unsigned());
     }
     words
 }

@@ -1,5 +1,6 @@
 use super::Finest;
 use super::fill::invalid;
+use super::median::filled;
 use mrfgs::image::Pair;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::plan::patches::{
@@ -57,7 +58,7 @@ pub fn far_plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
         let Some(plane @ (_, _, true)) = fits[y / 4 * across + x / 4] else { continue };
         let (at, value) = ((x, y), value(plane, x, y).clamp(low, high) as i32);
         let far = (maps.disparity[at] - value).abs() > PATCH_OUTVOTES;
-        if maps.validity[at] & i32::from(flag::FILLED) != 0 {
+        if filled(maps.validity[at]) {
             maps.disparity[at] = value;
         } else if !invalid(maps.validity[at]) && maps.confidence[at] < PATCH_DOUBT as i32 && far {
             maps.disparity[at] = value;

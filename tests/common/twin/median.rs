@@ -37,7 +37,7 @@ pub fn changes(plan: &Plan, validity: i32) -> bool {
 
 /// Whether a pixel is filled.
 pub fn filled(validity: i32) -> bool {
-    validity & i32::from(flag::FILLED) != 0
+    invalid(validity) && validity & i32::from(flag::FILLED) != 0
 }
 
 fn known(validity: i32) -> bool {

@@ -1,5 +1,6 @@
 use super::Finest;
 use super::fill::invalid;
+use super::median::filled;
 use mrfgs::image::Pair;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::plan::votes::{
@@ -41,7 +42,7 @@ pub fn vote_fill(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     for y in 0..height {
         for x in 0..width {
             let at = (x, y);
-            if before.validity[at] & i32::from(flag::FILLED) == 0 {
+            if !filled(before.validity[at]) {
                 let vote =
                     elected[y / 2][x / 2].filter(|_| !invalid(before.validity[at]) && !sure(&before, at));
                 if let Some(vote) =

@@ -5,6 +5,7 @@ mod findings;
 mod map;
 mod metrics;
 mod pairs;
+mod prior;
 mod report;
 mod scenes;
 mod submission;

@@ -9,11 +9,12 @@ use mrfgs::options::{Execution, Method};
 
 use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, scale};
 use crate::failure::{Failure, Result};
-use crate::matching;
+use crate::matching::{self, SearchSpace};
 use crate::outputs::files;
 use crate::pairs::folder::{self, Folder, Scene};
 
 use super::findings::{Figures, Findings, Scored};
+use super::prior::SampledPoints;
 
 /// Flags for reading the ground truth and writing the figures.
 #[derive(clap::Args)]
@@ -37,6 +38,16 @@ pub(super) struct SceneArgs {
 pub(super) struct RunArgs {
     #[command(flatten)]
     scenes: SceneArgs,
+
+    /// Gives each match a prior of points: a share of the known truth, which the figures then leave out
+    ///
+    /// SHARE is from 0 to 1. The points may have noise (a standard deviation in pixels), a share of outliers with random disparities, and lie
+    /// in evenly spaced rows alone, like those of a LiDAR: 0.01,0.5,0.2,16.
+    #[arg(long, value_name = "SHARE[,NOISE[,OUTLIERS[,ROWS]]]", value_parser = SampledPoints::parse)]
+    prior_from_truth: Option<SampledPoints>,
+    /// The seed of the sampled points
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "prior_from_truth")]
+    prior_seed: u64,
 
     #[command(flatten)]
     method: MethodArgs,
@@ -85,10 +96,15 @@ impl RunArgs {
         let mut pairs = Vec::new();
         let mut ran_on = None;
         for folder in folders {
-            let scene = folder.read(reading.reader(), *truth_scale)?;
+            let mut scene = folder.read(reading.reader(), *truth_scale)?;
+            let mut prior = None;
+            if let Some(points) = self.prior_from_truth {
+                let (sampled, rest) = points.sample(&scene.ground, self.prior_seed)?;
+                (prior, scene.ground) = (Some(sampled), rest);
+            }
             let (pair, name) = (&scene.pair, Some(scene.name.as_str()));
-            let (matched, time) =
-                matching::run(&mut matcher, pair, scene.range.into(), &method, name, false, None)?;
+            let searched = SearchSpace::from(scene.range).with_prior(prior.as_ref());
+            let (matched, time) = matching::run(&mut matcher, pair, searched, &method, name, false, None)?;
             see(&scene, &matched.maps, time)?;
             let (ground, maps, estimate) = (&scene.ground, &matched.maps, matched.maps.final_map());
             let figures = Figures {

@@ -72,7 +72,7 @@ impl Steps {
     }
 
     fn prepared(&self, prepared: &Prepared) -> Result<()> {
-        let Prepared { pair, label_ranges, zones } = prepared;
+        let Prepared { pair, label_ranges, zones, .. } = prepared;
         if self.plan.method.front.illumination != Illumination::None {
             self.corrected(pair)?;
         }

@@ -8,7 +8,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
 use mrfgs::sigma::Sigma;
 
-use crate::args::{CameraArgs, ExecutionArgs, MethodArgs, RectificationArgs, RegionArgs, Sign};
+use crate::args::{CameraArgs, ExecutionArgs, MethodArgs, PriorArgs, RectificationArgs, RegionArgs, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, AlsoArgs, InFront, MatchRecord, Outcome, View, Written, files, other_sign};
 use crate::pairs::input::{self, Input, PairArgs};
@@ -36,6 +36,8 @@ Examples:
   mrfgs match l.jpg r.jpg d.pfm --rectify
   # Raw images and a calibration:
   mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
+  # With points of a LiDAR in the left view, as lines of x,y,disparity:
+  mrfgs match l.png r.png d.pfm --max-disparity 90 --prior points.csv
   # Points as LAZ, in the frame of the left camera before rectification:
   mrfgs match l.png r.png d.pfm --rectify --calib c --also points-original.laz";
 
@@ -74,6 +76,8 @@ pub(crate) struct Args {
     rectify: bool,
     #[command(flatten)]
     rectification: RectificationArgs,
+    #[command(flatten)]
+    prior: PriorArgs,
     /// Checks everything and prints the plan (levels, schedule, memory), but runs and writes nothing
     #[arg(long)]
     dry_run: bool,
@@ -141,12 +145,14 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
         input.warn(region.as_ref());
     }
     let (width, height) = region.as_ref().map_or(input.pair.size(), |region| region.window().size());
-    let plan = Plan::new(width, height, range, &method)?;
+    let prior = args.prior.read(input.pair.size(), args.sign)?;
+    let plan = Plan::new(width, height, range, &method)?.with_prior(prior.is_some());
     if args.dry_run {
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
     let mut matcher = Matcher::builder().execution(execution).build()?;
-    let searched = input.searched(|wider| check_range(args, wider).is_ok()).in_region(part);
+    let searched = input.searched(|wider| check_range(args, wider).is_ok());
+    let searched = searched.in_region(part).with_prior(prior.as_ref());
     let (matched, time) =
         matching::run(&mut matcher, &input.pair, searched, &method, None, args.quiet, None)?;
     let range = matched.range();
@@ -217,6 +223,7 @@ fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathB
     let also: Vec<_> = args.also.wanted().map(|word| (word, word.beside(output))).collect();
     files::check_json_path(args.json.as_deref())?;
     let mut inputs = args.pair.inputs(input);
+    inputs.extend(args.prior.file().map(|path| ("the file of --prior", path)));
     inputs.extend(args.method.files().map(|path| ("the file of --method", path)));
     inputs.extend(args.also.into.as_deref().map(|path| ("the file of --into", path)));
     let flags: Vec<_> = also.iter().map(|(word, path)| (word.flag(), path.as_path())).collect();

@@ -3,7 +3,7 @@
 use super::plane::limits;
 use crate::backend::cpu::colours::{difference, mean_colours};
 use crate::image::{Pair, Plane};
-use crate::maps::flag;
+use crate::maps::{flag, is_filled};
 use crate::plan::Plan;
 use crate::plan::patches::{
     PATCH, PATCH_APART, PATCH_AWAY, PATCH_DOUBT, PATCH_FAR_BITS, PATCH_LEAST, PATCH_MOMENT, PATCH_OUTVOTES,
@@ -15,7 +15,7 @@ use crate::threads::prelude::*;
 use crate::weights::patch_weights;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
-    if !Stage::FarPlane.is_taken(&plan.method) {
+    if !Stage::FarPlane.is_taken(plan) {
         return;
     }
     let size = patches(plan);
@@ -36,7 +36,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
             let Some(fit) = fits[(x / PATCH, y / PATCH)].filter(|fit| fit.trusted) else { continue };
             let value = fit.at(x % PATCH, y % PATCH).clamp(low, high);
             let in_doubt = *flags & flag::INVALID == 0 && u32::from(*confidence) < PATCH_DOUBT;
-            if *flags & flag::FILLED != 0 {
+            if is_filled(*flags) {
                 *out = value;
             } else if in_doubt && (value - *out).abs() > PATCH_OUTVOTES {
                 (*out, *flags, *confidence) = (value, flag::OUTVOTED | flag::FILLED, 0);

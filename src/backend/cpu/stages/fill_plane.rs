@@ -3,7 +3,7 @@
 use super::median::smooth;
 use super::plane::limits;
 use crate::image::Pair;
-use crate::maps::flag;
+use crate::maps::is_filled;
 use crate::plan::Plan;
 use crate::stage::MapSet;
 use crate::weights::{FILL_STEP_BITS, MedianWeights};
@@ -13,6 +13,6 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     let limits = plan.method.refinement.plane.then(|| limits(plan));
     for step_bits in FILL_STEP_BITS {
         let weights = MedianWeights::of_filled(&plan.method, step_bits);
-        smooth(&weights, |f| f & flag::FILLED != 0, limits, guide, maps);
+        smooth(&weights, is_filled, limits, guide, maps);
     }
 }

@@ -8,7 +8,7 @@ use crate::backend::cpu::least_squares::Planes;
 use crate::backend::cpu::places::{LANES, Values, Weighed};
 use crate::backend::cpu::units::{block, each_lane};
 use crate::image::{Image, Pair, Plane};
-use crate::maps::{flag, has_disparity};
+use crate::maps::{has_disparity, is_filled};
 use crate::options::Median;
 use crate::plan::Plan;
 use crate::plan::planes::PLANE_START_BITS;
@@ -26,7 +26,7 @@ pub(super) fn touched(plan: &Plan) -> impl Fn(u8) -> bool + Sync {
     let median = plan.method.refinement.median;
     move |f: u8| match median {
         Median::Off => false,
-        Median::Filled => f & flag::FILLED != 0,
+        Median::Filled => is_filled(f),
         Median::All => has_disparity(f),
     }
 }

@@ -3,7 +3,7 @@
 use crate::backend::cpu::colours::{channels, difference, mean_colours};
 use crate::backend::cpu::units::{block, each_lane};
 use crate::image::{Image, Pair, Plane};
-use crate::maps::{FRACTION, flag};
+use crate::maps::{FRACTION, flag, is_filled};
 use crate::options::{Fill, Nearer};
 use crate::plan::Plan;
 use crate::plan::votes::{
@@ -45,7 +45,7 @@ fn asked(maps: &MapSet, votes: Votes) -> Plane<bool> {
     let mut asked = Plane::filled(votes.width, votes.height, false);
     asked.data_mut().par_chunks_mut(votes.width).enumerate().for_each(|(y, asked)| {
         for row in (2 * y).saturating_sub(2)..(2 * y + 4).min(validity.height()) {
-            for (x, _) in validity.row(row).iter().enumerate().filter(|&(_, f)| f & flag::FILLED != 0) {
+            for (x, _) in validity.row(row).iter().enumerate().filter(|&(_, &f)| is_filled(f)) {
                 asked[around(x, votes.width)].fill(true);
             }
         }
@@ -285,7 +285,7 @@ fn take(maps: &mut MapSet, left: &Image, colours: &Plane<[u8; 3]>, elected: &Pla
         for (x, ((disparity, flags), confidence)) in
             disparity.iter_mut().zip(flags).zip(confidence).enumerate()
         {
-            if *flags & flag::FILLED != 0 {
+            if is_filled(*flags) {
                 let own = channels(left.pixels[(x, y)]);
                 let places = around(y, elected.height())
                     .flat_map(|row| around(x, elected.width()).map(move |column| (column, row)));

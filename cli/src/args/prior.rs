@@ -1,0 +1,181 @@
+//! What is known of the scene.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::ValueEnum;
+use csv::{ReaderBuilder, Trim};
+use mrfgs::image::read;
+use mrfgs::low_level::text;
+use mrfgs::prior::{PriorKind, PriorPoint};
+use mrfgs::{Error, Prior};
+
+use crate::args::Sign;
+use crate::failure::{Failure, Result};
+
+/// Largest share of known pixels, in percent, with which a map counts as points.
+const SPARSE: usize = 20;
+/// Largest list of points, in bytes.
+const MOST_BYTES: u64 = 1 << 30;
+/// Standard deviations of points and of surfaces, unless given, in px.
+const SIGMAS: [f64; 2] = [0.25, 1.0];
+
+/// How a prior is used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Kind {
+    /// Exact but sparse: cleaned, spread, and they decide where no match can be trusted
+    Points,
+    /// Dense but coarse: it only shifts the balance between disparities
+    Surface,
+}
+
+/// The prior of a match.
+#[derive(clap::Args)]
+#[command(next_help_heading = "What is known of the scene")]
+pub(crate) struct PriorArgs {
+    /// Disparities of LEFT that are known: points of a LiDAR or of a bundle adjustment, a terrain model, the map of the last frame
+    ///
+    /// Either a disparity map of the size of LEFT (PFM, TIFF, PNG as in KITTI, NPY; 0 of a PNG, infinity and NaN are unknown), or a .csv or
+    /// .txt file with a line `x,y,disparity` or `x,y,disparity,sigma` for each point, in pixels. With --rectify, they belong to the rectified view.
+    #[arg(long, value_name = "FILE")]
+    prior: Option<PathBuf>,
+    /// Standard deviation of the known disparities, in pixels [default: 0.25 for points, 1 for surfaces]
+    #[arg(long, value_name = "PIXELS", requires = "prior", allow_negative_numbers = true)]
+    prior_sigma: Option<f64>,
+    /// How to use them [default: points where at most a fifth of the pixels are known]
+    #[arg(long, value_enum, value_name = "KIND", requires = "prior")]
+    prior_kind: Option<Kind>,
+}
+
+impl PriorArgs {
+    /// The file, if there is one.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        self.prior.as_deref()
+    }
+
+    /// Reads the prior for a left view of (width, height) pixels, with disparities by `sign`.
+    pub(crate) fn read(&self, size: (usize, usize), sign: Sign) -> Result<Option<Arc<Prior>>> {
+        let Some(path) = self.file() else { return Ok(None) };
+        if let Some(sigma) = self.prior_sigma.filter(|sigma| !(*sigma > 0.0 && sigma.is_finite())) {
+            return Err(Failure::usage("--prior-sigma", format!("{sigma} is not above 0")));
+        }
+        let prior = if is_list(path) { self.listed(path, size, sign) } else { self.map(path, size, sign) };
+        prior.map(|prior| Some(Arc::new(prior)))
+    }
+
+    fn sigma(&self, kind: PriorKind) -> f64 {
+        self.prior_sigma.unwrap_or(SIGMAS[usize::from(kind == PriorKind::Surface)])
+    }
+
+    fn kind(&self) -> Option<PriorKind> {
+        self.prior_kind.map(|kind| match kind {
+            Kind::Points => PriorKind::Points,
+            Kind::Surface => PriorKind::Surface,
+        })
+    }
+
+    fn map(&self, path: &Path, size: (usize, usize), sign: Sign) -> Result<Prior> {
+        let map = sign.map(read::read_disparity(path)?);
+        if map.size() != size {
+            let ((w, h), (width, height)) = (map.size(), size);
+            let reason = format!("{} has {w} x {h} pixels, LEFT {width} x {height}", path.display());
+            return Err(Failure::usage("--prior", format!("{reason}; give a map of LEFT")));
+        }
+        let known = map.data().iter().filter(|d| d.is_finite()).count();
+        let sparse = 100 * known <= SPARSE * map.data().len();
+        let kind = self.kind().unwrap_or(if sparse { PriorKind::Points } else { PriorKind::Surface });
+        let sigma = self.sigma(kind);
+        let prior = match kind {
+            PriorKind::Points => Prior::points_of(&map, sigma),
+            PriorKind::Surface => Prior::surface(&map, sigma),
+        };
+        prior.map_err(|e| named(path, e))
+    }
+
+    fn listed(&self, path: &Path, size: (usize, usize), sign: Sign) -> Result<Prior> {
+        if self.kind() == Some(PriorKind::Surface) {
+            let reason = format!("{} holds points; give a map for a surface", path.display());
+            return Err(Failure::usage("--prior-kind", reason));
+        }
+        let text = text::read(path, MOST_BYTES, "a list of points")?;
+        let mut reader =
+            ReaderBuilder::new().has_headers(false).flexible(true).trim(Trim::All).from_reader(&text[..]);
+        let mut points = Vec::new();
+        for (i, row) in reader.records().enumerate() {
+            let row = row.map_err(|e| Failure::usage("--prior", format!("{}: {e}", path.display())))?;
+            let values: Option<Vec<f64>> = row.iter().map(|value| value.parse().ok()).collect();
+            let point = match values.as_deref() {
+                Some(&[x, y, d]) => PriorPoint { x, y, disparity: d, sigma: self.sigma(PriorKind::Points) },
+                Some(&[x, y, d, sigma]) => {
+                    PriorPoint { x, y, disparity: d, sigma: self.prior_sigma.unwrap_or(sigma) }
+                }
+                // A line with names of columns.
+                None if i == 0 => continue,
+                _ => {
+                    let line = row.position().map_or(i as u64 + 1, csv::Position::line);
+                    let reason = "not x,y,disparity or x,y,disparity,sigma in pixels";
+                    return Err(Failure::usage(
+                        "--prior",
+                        format!("{}, line {line}: {reason}", path.display()),
+                    ));
+                }
+            };
+            let disparity = if sign == Sign::default() { point.disparity } else { -point.disparity };
+            points.push(PriorPoint { disparity, ..point });
+        }
+        if points.is_empty() {
+            return Err(Failure::usage("--prior", format!("{} holds no point", path.display())));
+        }
+        Prior::points(size, points).map_err(|e| named(path, e))
+    }
+}
+
+/// Whether a file holds a list of points.
+fn is_list(path: &Path) -> bool {
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    ["csv", "txt"].iter().any(|list| extension.eq_ignore_ascii_case(list))
+}
+
+/// The failure of a prior, with its file.
+fn named(path: &Path, e: Error) -> Failure {
+    match e {
+        Error::Mismatch(reason) => Failure::usage("--prior", format!("{}: {reason}", path.display())),
+        e => e.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Sign::{LeftMinusRight, RightMinusLeft};
+
+    fn given(name: &str, text: &str, sigma: Option<f64>) -> (tempfile::TempDir, PriorArgs) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        (folder, PriorArgs { prior: Some(path), prior_sigma: sigma, prior_kind: None })
+    }
+
+    fn points(text: &str, sign: Sign) -> std::result::Result<Arc<Prior>, String> {
+        let (_folder, args) = given("points.csv", text, None);
+        args.read((8, 6), sign).map(Option::unwrap).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn points_are_listed_with_and_without_names_and_sigma() {
+        let all = points("x,y,d,sigma\n1,2,3.5,0.5\n 4, 5 , 6\n", LeftMinusRight).unwrap();
+        assert_eq!((all.count(), all.kind()), (2, PriorKind::Points));
+        assert_eq!(points("1,2,-3.5,0.5\n4,5,-6", RightMinusLeft).unwrap(), all);
+    }
+
+    #[test]
+    fn bad_lists_are_named_with_their_line() {
+        let line = points("1,2,3\n1,2,x\n", LeftMinusRight).unwrap_err();
+        assert!(line.contains("points.csv, line 2"), "{line}");
+        assert!(points("", LeftMinusRight).unwrap_err().contains("no point"));
+        assert!(points("90,2,3\n", LeftMinusRight).unwrap_err().contains("none of the 1 points"));
+        assert!(points("1,2,3,-1\n", LeftMinusRight).unwrap_err().contains("-1 px"));
+        let (_folder, args) = given("points.csv", "1,2,3", Some(-1.0));
+        assert!(args.read((8, 6), LeftMinusRight).unwrap_err().to_string().contains("--prior-sigma"));
+    }
+}

@@ -1,0 +1,298 @@
+//! What is known of a scene before it is matched: measured points, or a coarse surface.
+//!
+//! A [`Prior`] belongs to a single match: see [`Job::prior`](crate::Job::prior). It holds for the left view. Its disparities, each
+//! with a standard deviation, enter the factor graph as a unary factor of every level, in addition to the evidence of the images.
+//!
+//! - Points ([`Prior::points`]) are exact but sparse: of a LiDAR, a depth sensor or a bundle adjustment. Those that their neighbours
+//!   contradict are dropped. The others are spread to the pixels around them, by distance and colour, and where no match can be
+//!   trusted they decide.
+//! - A surface ([`Prior::surface`]) is dense but coarse: a terrain model, the depth map of a phone, or the map of the last frame.
+//!   It only shifts the balance between labels.
+//!
+//! Where the images contradict a prior, it counts less: see [`PriorUse::trust`].
+
+use crate::error::{Error, Result};
+use crate::image::{Plane, Rect};
+use crate::maps::FRACTION;
+use crate::options::MAX_DISPARITY;
+
+/// Smallest and largest standard deviation, in px; others are set to these.
+const SIGMAS: [f64; 2] = [1.0 / 16.0, 255.0];
+
+/// How a prior is used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PriorKind {
+    /// Sparse, exact points.
+    Points,
+    /// A dense, coarse surface.
+    Surface,
+}
+
+/// A point of the left view with known disparity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PriorPoint {
+    /// Column in px; whole numbers are centres of pixels.
+    pub x: f64,
+    /// Row in px.
+    pub y: f64,
+    /// Disparity in px.
+    pub disparity: f64,
+    /// Standard deviation of the disparity in px, above 0.
+    pub sigma: f64,
+}
+
+/// What became of the prior of a match.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PriorUse {
+    /// How it was used.
+    pub kind: PriorKind,
+    /// Number of pixels for which a disparity was given.
+    pub given: usize,
+    /// Number of these that their neighbours contradict; they were dropped.
+    pub dropped: usize,
+    /// How well the images agree with it, 0.0 ..= 1.0. Its weight is multiplied by this.
+    pub trust: f64,
+}
+
+/// Known disparities of the left view. See the [module](self).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Prior {
+    pub(crate) kind: PriorKind,
+    /// In 1/256 px; meaningless where `sigma` is 0.
+    pub(crate) disparity: Plane<i32>,
+    /// Standard deviation in 1/256 px; 0 where nothing is known.
+    pub(crate) sigma: Plane<u16>,
+}
+
+impl Prior {
+    /// Sparse points of a left view of (width, height) pixels. Of several points in one pixel, the nearest (with the largest
+    /// disparity) counts, because it hides the others. Points outside the view are left out.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] for values that are not finite, disparities beyond [`MAX_DISPARITY`], standard deviations that are not above
+    /// 0, and if no point lies inside the view.
+    pub fn points(
+        (width, height): (usize, usize),
+        points: impl IntoIterator<Item = PriorPoint>,
+    ) -> Result<Self> {
+        let mut prior = Self::nothing(PriorKind::Points, (width, height));
+        let (mut inside, mut all) = (0_usize, 0_usize);
+        for point in points {
+            let PriorPoint { x, y, disparity, sigma } = point;
+            all += 1;
+            if ![x, y, disparity, sigma].iter().all(|value| value.is_finite()) {
+                return Err(Error::Mismatch(format!(
+                    "point {all} of the prior has a value that is not a number"
+                )));
+            }
+            check(disparity, sigma, || format!("point {all} of the prior"))?;
+            let (x, y) = ((x + 0.5).floor(), (y + 0.5).floor());
+            if x < 0.0 || y < 0.0 || x >= width as f64 || y >= height as f64 {
+                continue;
+            }
+            inside += 1;
+            let (at, disparity) = ((x as usize, y as usize), fixed(disparity));
+            if prior.sigma[at] == 0 || disparity > prior.disparity[at] {
+                (prior.disparity[at], prior.sigma[at]) = (disparity, fixed_sigma(sigma));
+            }
+        }
+        if all > 0 && inside == 0 {
+            return Err(Error::Mismatch(format!(
+                "none of the {all} points of the prior lies inside the left view of {width} x {height} pixels"
+            )));
+        }
+        Ok(prior)
+    }
+
+    /// A dense, coarse surface: a disparity in px for each pixel, with a standard deviation in px; not finite where nothing is known.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] for disparities beyond [`MAX_DISPARITY`], and if `sigma` is not above 0.
+    pub fn surface(disparity: &Plane<f32>, sigma: f64) -> Result<Self> {
+        Self::map(PriorKind::Surface, disparity, |_| sigma)
+    }
+
+    /// Like [`Self::surface`], with a standard deviation for each pixel.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] for disparities beyond [`MAX_DISPARITY`], for standard deviations that are not above 0 where a disparity is
+    /// known, and if the maps differ in size.
+    pub fn surface_with(disparity: &Plane<f32>, sigma: &Plane<f32>) -> Result<Self> {
+        if disparity.size() != sigma.size() {
+            let ([w, h], [sw, sh]) = (size_of(disparity), size_of(sigma));
+            return Err(Error::Mismatch(format!(
+                "the prior has {w} x {h} disparities and {sw} x {sh} standard deviations"
+            )));
+        }
+        Self::map(PriorKind::Surface, disparity, |at| sigma[at].into())
+    }
+
+    /// The points of a sparse disparity map in px, not finite where nothing is known, all with the same standard deviation in px.
+    ///
+    /// # Errors
+    /// The errors of [`Self::surface`].
+    pub fn points_of(disparity: &Plane<f32>, sigma: f64) -> Result<Self> {
+        Self::map(PriorKind::Points, disparity, |_| sigma)
+    }
+
+    fn map(kind: PriorKind, disparity: &Plane<f32>, sigma: impl Fn((usize, usize)) -> f64) -> Result<Self> {
+        let (width, height) = disparity.size();
+        let mut prior = Self::nothing(kind, (width, height));
+        for at in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let (d, sigma) = (f64::from(disparity[at]), sigma(at));
+            if d.is_finite() {
+                check(d, sigma, || format!("the prior at column {}, row {}", at.0, at.1))?;
+                (prior.disparity[at], prior.sigma[at]) = (fixed(d), fixed_sigma(sigma));
+            }
+        }
+        Ok(prior)
+    }
+
+    /// A prior that knows nothing of a view of this size.
+    pub(crate) fn nothing(kind: PriorKind, (width, height): (usize, usize)) -> Self {
+        Self { kind, disparity: Plane::filled(width, height, 0), sigma: Plane::filled(width, height, 0) }
+    }
+
+    /// (width, height) of the left view, in pixels.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        self.disparity.size()
+    }
+
+    /// How it is used.
+    #[must_use]
+    pub fn kind(&self) -> PriorKind {
+        self.kind
+    }
+
+    /// Number of pixels with a known disparity.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.sigma.data().iter().filter(|&&sigma| sigma > 0).count()
+    }
+
+    /// What is known of `part` of the view.
+    #[must_use]
+    pub fn crop(&self, part: &Rect) -> Self {
+        Self { kind: self.kind, disparity: self.disparity.crop(part), sigma: self.sigma.crop(part) }
+    }
+
+    /// The known pixels: (x, y), disparity and standard deviation in 1/256 px.
+    pub(crate) fn known(&self) -> impl Iterator<Item = ((usize, usize), i32, u16)> + '_ {
+        let width = self.disparity.width();
+        let pixels = self.disparity.data().iter().zip(self.sigma.data()).enumerate();
+        pixels
+            .filter(|(_, (_, sigma))| **sigma > 0)
+            .map(move |(i, (&d, &sigma))| ((i % width, i / width), d, sigma))
+    }
+
+    /// What is known at half the size, rounded up. Of several known pixels of a block, the nearest counts.
+    pub(crate) fn halved(&self) -> Self {
+        let (width, height) = self.size();
+        let mut half = Self::nothing(self.kind, (width.div_ceil(2), height.div_ceil(2)));
+        for ((x, y), disparity, sigma) in self.known() {
+            half.add((x / 2, y / 2), (disparity.div_euclid(2), sigma.div_ceil(2)));
+        }
+        half
+    }
+
+    /// What is known at twice the size: the same of all four pixels of a block.
+    pub(crate) fn doubled(&self) -> Self {
+        let (width, height) = self.size();
+        let of = |x: usize, y: usize| (x / 2, y / 2);
+        Self {
+            kind: self.kind,
+            disparity: Plane::from_fn(2 * width, 2 * height, |x, y| 2 * self.disparity[of(x, y)]),
+            sigma: Plane::from_fn(2 * width, 2 * height, |x, y| self.sigma[of(x, y)].saturating_mul(2)),
+        }
+    }
+
+    /// What is known of the left view of the mirrored pair, which is the right view of the pair: each known pixel where it is
+    /// seen, the nearest of several.
+    pub(crate) fn mirrored(&self) -> Self {
+        let (width, height) = self.size();
+        let mut mirrored = Self::nothing(self.kind, (width, height));
+        for ((x, y), disparity, sigma) in self.known() {
+            let seen = x as i32 - (disparity + FRACTION / 2).div_euclid(FRACTION);
+            if let Some(seen) = usize::try_from(seen).ok().filter(|seen| *seen < width) {
+                mirrored.add((width - 1 - seen, y), (disparity, sigma));
+            }
+        }
+        mirrored
+    }
+
+    /// Adds a known disparity, unless a nearer one is known there.
+    fn add(&mut self, at: (usize, usize), (disparity, sigma): (i32, u16)) {
+        if self.sigma[at] == 0 || disparity > self.disparity[at] {
+            (self.disparity[at], self.sigma[at]) = (disparity, sigma);
+        }
+    }
+}
+
+fn size_of<T>(plane: &Plane<T>) -> [usize; 2] {
+    plane.size().into()
+}
+
+fn check(disparity: f64, sigma: f64, name: impl Fn() -> String) -> Result<()> {
+    if disparity.abs() > f64::from(MAX_DISPARITY) {
+        return Err(Error::Mismatch(format!(
+            "{} has a disparity of {disparity} px; the most is {MAX_DISPARITY}",
+            name()
+        )));
+    }
+    if !(sigma > 0.0 && sigma.is_finite()) {
+        return Err(Error::Mismatch(format!(
+            "{} has a standard deviation of {sigma} px, which is not above 0",
+            name()
+        )));
+    }
+    Ok(())
+}
+
+fn fixed(disparity: f64) -> i32 {
+    (disparity * f64::from(FRACTION) + 0.5).floor() as i32
+}
+
+fn fixed_sigma(sigma: f64) -> u16 {
+    (sigma.clamp(SIGMAS[0], SIGMAS[1]) * f64::from(FRACTION) + 0.5).floor() as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(x: f64, y: f64, disparity: f64) -> PriorPoint {
+        PriorPoint { x, y, disparity, sigma: 0.25 }
+    }
+
+    #[test]
+    fn the_nearest_point_of_a_pixel_counts() {
+        let points = [point(1.4, 0.6, 3.0), point(0.8, 1.2, 7.5), point(1.0, 1.0, 5.0), point(9.0, 0.0, 1.0)];
+        let prior = Prior::points((4, 3), points).unwrap();
+        assert_eq!(prior.known().collect::<Vec<_>>(), [((1, 1), 1920, 64)]);
+        assert_eq!(prior.halved().known().collect::<Vec<_>>(), [((0, 0), 960, 32)]);
+        assert_eq!(prior.doubled().count(), 4);
+    }
+
+    #[test]
+    fn known_pixels_are_seen_in_the_mirrored_pair() {
+        let points = [point(6.0, 0.0, 2.0), point(7.0, 0.0, 3.0), point(1.0, 0.0, 2.0)];
+        let mirrored = Prior::points((8, 1), points).unwrap().mirrored();
+        // Columns 4 and 4 of the right view: the nearer of both. Column -1 is outside.
+        assert_eq!(mirrored.known().collect::<Vec<_>>(), [((3, 0), 768, 64)]);
+    }
+
+    #[test]
+    fn bad_values_are_named() {
+        let error = |points: &[PriorPoint]| Prior::points((4, 4), points.to_vec()).unwrap_err().to_string();
+        assert!(error(&[point(0.0, 0.0, 1.0), point(f64::NAN, 0.0, 1.0)]).contains("point 2 of the prior"));
+        assert!(error(&[PriorPoint { sigma: -1.0, ..point(0.0, 0.0, 1.0) }]).contains("-1 px"));
+        assert!(error(&[point(4.0, 0.0, 1.0)]).contains("none of the 1 points"));
+        assert!(error(&[point(0.0, 0.0, 1e7)]).contains("10000000 px"));
+        let map = Plane::new(2, 1, vec![1.0, f32::INFINITY]);
+        assert_eq!(Prior::surface(&map, 1.0).unwrap().count(), 1);
+        assert!(Prior::surface(&map, 0.0).is_err());
+        let sigma = Plane::new(1, 1, vec![1.0]);
+        assert!(Prior::surface_with(&map, &sigma).unwrap_err().to_string().contains("2 x 1"));
+    }
+}
