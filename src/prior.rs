@@ -6,7 +6,7 @@
 //! - Points ([`Prior::points`]) are exact but sparse: of a LiDAR, a depth sensor or a bundle adjustment. Those that their neighbours
 //!   contradict are dropped. The others are spread to the pixels around them, by distance and colour, and where no match can be
 //!   trusted they decide.
-//! - A surface ([`Prior::surface`]) is dense but coarse: a terrain model, the depth map of a phone, or the map of the last frame.
+//! - A surface ([`Prior::map`]) is dense but coarse: a terrain model, the depth map of a phone, or the map of the last frame.
 //!   It only shifts the balance between labels.
 //!
 //! Where the images contradict a prior, it counts less: see [`PriorUse::trust`].
@@ -26,6 +26,24 @@ pub enum PriorKind {
     Points,
     /// A dense, coarse surface.
     Surface,
+}
+
+impl PriorKind {
+    /// How a map is used unless the user says it: points where at most a fifth of the pixels are known (finite).
+    #[must_use]
+    pub fn of_map(disparity: &Plane<f32>) -> Self {
+        let known = disparity.data().iter().filter(|d| d.is_finite()).count();
+        if 5 * known <= disparity.data().len() { Self::Points } else { Self::Surface }
+    }
+
+    /// The standard deviation of a prior whose own is not known, in px.
+    #[must_use]
+    pub fn usual_sigma(self) -> f64 {
+        match self {
+            Self::Points => 0.25,
+            Self::Surface => 1.0,
+        }
+    }
 }
 
 /// A point of the left view with known disparity.
@@ -104,43 +122,40 @@ impl Prior {
         Ok(prior)
     }
 
-    /// A dense, coarse surface: a disparity in px for each pixel, with a standard deviation in px; not finite where nothing is known.
+    /// A map of disparities in px, not finite where nothing is known, all with the same standard deviation in px.
     ///
     /// # Errors
     /// [`Error::Mismatch`] for disparities beyond [`MAX_DISPARITY`], and if `sigma` is not above 0.
-    pub fn surface(disparity: &Plane<f32>, sigma: f64) -> Result<Self> {
-        Self::map(PriorKind::Surface, disparity, |_| sigma)
+    pub fn map(kind: PriorKind, disparity: &Plane<f32>, sigma: f64) -> Result<Self> {
+        Self::of_map(kind, disparity, |_| sigma)
     }
 
-    /// Like [`Self::surface`], with a standard deviation for each pixel.
+    /// Like [`Self::map`], with a standard deviation for each pixel.
     ///
     /// # Errors
     /// [`Error::Mismatch`] for disparities beyond [`MAX_DISPARITY`], for standard deviations that are not above 0 where a disparity is
     /// known, and if the maps differ in size.
-    pub fn surface_with(disparity: &Plane<f32>, sigma: &Plane<f32>) -> Result<Self> {
+    pub fn map_with(kind: PriorKind, disparity: &Plane<f32>, sigma: &Plane<f32>) -> Result<Self> {
         if disparity.size() != sigma.size() {
-            let ([w, h], [sw, sh]) = (size_of(disparity), size_of(sigma));
+            let ((w, h), (sw, sh)) = (disparity.size(), sigma.size());
             return Err(Error::Mismatch(format!(
                 "the prior has {w} x {h} disparities and {sw} x {sh} standard deviations"
             )));
         }
-        Self::map(PriorKind::Surface, disparity, |at| sigma[at].into())
+        Self::of_map(kind, disparity, |at| sigma[at].into())
     }
 
-    /// The points of a sparse disparity map in px, not finite where nothing is known, all with the same standard deviation in px.
-    ///
-    /// # Errors
-    /// The errors of [`Self::surface`].
-    pub fn points_of(disparity: &Plane<f32>, sigma: f64) -> Result<Self> {
-        Self::map(PriorKind::Points, disparity, |_| sigma)
-    }
-
-    fn map(kind: PriorKind, disparity: &Plane<f32>, sigma: impl Fn((usize, usize)) -> f64) -> Result<Self> {
+    fn of_map(
+        kind: PriorKind,
+        disparity: &Plane<f32>,
+        sigma: impl Fn((usize, usize)) -> f64,
+    ) -> Result<Self> {
         let (width, height) = disparity.size();
         let mut prior = Self::nothing(kind, (width, height));
         for at in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            let (d, sigma) = (f64::from(disparity[at]), sigma(at));
+            let d = f64::from(disparity[at]);
             if d.is_finite() {
+                let sigma = sigma(at);
                 check(d, sigma, || format!("the prior at column {}, row {}", at.0, at.1))?;
                 (prior.disparity[at], prior.sigma[at]) = (fixed(d), fixed_sigma(sigma));
             }
@@ -229,10 +244,6 @@ impl Prior {
     }
 }
 
-fn size_of<T>(plane: &Plane<T>) -> [usize; 2] {
-    plane.size().into()
-}
-
 fn check(disparity: f64, sigma: f64, name: impl Fn() -> String) -> Result<()> {
     if disparity.abs() > f64::from(MAX_DISPARITY) {
         return Err(Error::Mismatch(format!(
@@ -290,9 +301,9 @@ mod tests {
         assert!(error(&[point(4.0, 0.0, 1.0)]).contains("none of the 1 points"));
         assert!(error(&[point(0.0, 0.0, 1e7)]).contains("10000000 px"));
         let map = Plane::new(2, 1, vec![1.0, f32::INFINITY]);
-        assert_eq!(Prior::surface(&map, 1.0).unwrap().count(), 1);
-        assert!(Prior::surface(&map, 0.0).is_err());
+        assert_eq!(Prior::map(PriorKind::Surface, &map, 1.0).unwrap().count(), 1);
+        assert!(Prior::map(PriorKind::Surface, &map, 0.0).is_err());
         let sigma = Plane::new(1, 1, vec![1.0]);
-        assert!(Prior::surface_with(&map, &sigma).unwrap_err().to_string().contains("2 x 1"));
+        assert!(Prior::map_with(PriorKind::Surface, &map, &sigma).unwrap_err().to_string().contains("2 x 1"));
     }
 }

@@ -65,6 +65,9 @@ fn save(scene: &scenes::Scene, folder: &Path) -> Result<()> {
     write_png(&folder.join("mask0nocc.png"), size, scene.mask.data(), ExtendedColorType::L8)?;
     write_pfm(&folder.join("disp0GT.pfm"), &scene.truth)?;
     fs::write(folder.join("calib.txt"), scene.calibration())?;
+    if scene.name == "poster" {
+        fs::write(folder.join("lidar.csv"), scene.lidar())?;
+    }
     println!("{}", folder.display());
     Ok(())
 }

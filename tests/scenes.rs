@@ -77,6 +77,10 @@ fn the_files_are_a_fresh_rendering() {
         assert!(truth == pfm(&scene.truth), "{name}/disp0GT.pfm: render the scenes again");
         let calib = fs::read_to_string(folder.join("calib.txt")).unwrap();
         assert_eq!(calib, scene.calibration(), "{name}: render the scenes again");
+        if name == "poster" {
+            let lidar = fs::read_to_string(folder.join("lidar.csv")).unwrap();
+            assert_eq!(lidar, scene.lidar(), "{name}: render the scenes again");
+        }
     }
 }
 

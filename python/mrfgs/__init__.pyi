@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any, Iterable, Iterator, Mapping, Sequence, TypedDict, final
+from typing import Any, Iterable, Iterator, Literal, Mapping, Sequence, TypedDict, final
 
 import numpy as np
 import numpy.typing as npt
@@ -115,6 +115,9 @@ class Matcher:
         mask: npt.ArrayLike | None = None,
         no_data: float | None = None,
         roi: Sequence[int] | None = None,
+        prior: npt.ArrayLike | None = None,
+        prior_sigma: npt.ArrayLike | None = None,
+        prior_kind: Literal["points", "surface"] | None = None,
         method: _Path | None = None,
         options: Mapping[str, Any] | None = None,
         memory: str | None = None,
@@ -351,6 +354,9 @@ def match(
     mask: npt.ArrayLike | None = None,
     no_data: float | None = None,
     roi: Sequence[int] | None = None,
+    prior: npt.ArrayLike | None = None,
+    prior_sigma: npt.ArrayLike | None = None,
+    prior_kind: Literal["points", "surface"] | None = None,
     method: _Path | None = None,
     options: Mapping[str, Any] | None = None,
     memory: str | None = None,

@@ -9,6 +9,7 @@ mod exceptions;
 mod matched;
 mod matcher;
 mod options;
+mod prior;
 mod range;
 mod rectification;
 mod sequence;

@@ -59,6 +59,13 @@ impl PyMatcher {
     /// no_data: a value for no data: pixels that have it in every channel are ignored, in both images.
     /// roi: (x, y, width, height) of a region of the left image in pixels; only that is matched, in proportionally less time, and the maps
     ///     have its size. Rig.of_part gives its depths and points.
+    /// prior: disparities of the left image that are known: an array of its shape, +inf or NaN where nothing is known, or points as an array
+    ///     of shape (n, 3) or (n, 4) with rows x, y, disparity and perhaps their standard deviation, all in pixels.
+    /// prior_sigma: the standard deviation of the prior in pixels, for all or as an array of the shape of the image; by default 0.25 for
+    ///     points and 1 for surfaces.
+    /// prior_kind: "points" are exact but sparse: they are cleaned and spread, and decide where no match can be trusted. A "surface" is
+    ///     dense but coarse, and only shifts the balance between disparities. An array of the shape of the image counts as points if at
+    ///     most a fifth of it is known.
     /// method: the name of a preset (see mrfgs.presets()), or the path of a TOML file that overrides keys of the preset "default"; the
     ///     default is that preset.
     /// options: options that override the method, such as {"fill": "none", "memory": 2048}; see mrfgs.options(). A key may include its
@@ -72,8 +79,8 @@ impl PyMatcher {
     /// RuntimeError if the selected device fails, and MemoryError if memory is too small.
     #[pyo3(
         name = "match",
-        signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, roi=None, method=None,
-                     options=None, memory=None, warn=true)
+        signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, roi=None, prior=None,
+                     prior_sigma=None, prior_kind=None, method=None, options=None, memory=None, warn=true)
     )]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn run(
@@ -86,6 +93,9 @@ impl PyMatcher {
         mask: Option<&Bound<PyAny>>,
         no_data: Option<f64>,
         roi: Option<&Bound<PyAny>>,
+        prior: Option<&Bound<PyAny>>,
+        prior_sigma: Option<&Bound<PyAny>>,
+        prior_kind: Option<&str>,
         method: Option<&Bound<PyAny>>,
         options: Option<&Bound<PyAny>>,
         memory: Option<&Bound<PyAny>>,
@@ -97,6 +107,7 @@ impl PyMatcher {
         let pair = arrays::pair(&left, &right, mask, no_data)?;
         let min_disparity = range::pixels("min_disparity", min_disparity)?;
         let given = range::given(range::pixels("max_disparity", max_disparity)?, min_disparity)?;
+        let prior = crate::prior::prior(pair.size(), prior, prior_sigma, prior_kind)?;
         let matcher = &self.0.matcher;
         let range = range::searched(py, matcher, &pair, given, min_disparity)?;
         let part = roi.map(|roi| region(roi, &pair, range)).transpose()?;
@@ -114,6 +125,10 @@ impl PyMatcher {
                     };
                     let job = match &part {
                         Some(part) => job.region(part.part().clone()),
+                        None => job,
+                    };
+                    let job = match &prior {
+                        Some(prior) => job.prior(Arc::clone(prior)),
                         None => job,
                     };
                     job.method(&method).cancel(stop).run()
@@ -172,8 +187,8 @@ impl PyMatcher {
 #[pyfunction]
 #[pyo3(
     name = "match",
-    signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, roi=None, method=None,
-                 options=None, memory=None, warn=true, device=None, threads=None)
+    signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, roi=None, prior=None,
+                 prior_sigma=None, prior_kind=None, method=None, options=None, memory=None, warn=true, device=None, threads=None)
 )]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
 pub(crate) fn match_(
@@ -185,6 +200,9 @@ pub(crate) fn match_(
     mask: Option<&Bound<PyAny>>,
     no_data: Option<f64>,
     roi: Option<&Bound<PyAny>>,
+    prior: Option<&Bound<PyAny>>,
+    prior_sigma: Option<&Bound<PyAny>>,
+    prior_kind: Option<&str>,
     method: Option<&Bound<PyAny>>,
     options: Option<&Bound<PyAny>>,
     memory: Option<&Bound<PyAny>>,
@@ -202,6 +220,9 @@ pub(crate) fn match_(
         mask,
         no_data,
         roi,
+        prior,
+        prior_sigma,
+        prior_kind,
         method,
         options,
         memory,

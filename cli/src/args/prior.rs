@@ -13,12 +13,8 @@ use mrfgs::{Error, Prior};
 use crate::args::Sign;
 use crate::failure::{Failure, Result};
 
-/// Largest share of known pixels, in percent, with which a map counts as points.
-const SPARSE: usize = 20;
 /// Largest list of points, in bytes.
 const MOST_BYTES: u64 = 1 << 30;
-/// Standard deviations of points and of surfaces, unless given, in px.
-const SIGMAS: [f64; 2] = [0.25, 1.0];
 
 /// How a prior is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -64,7 +60,7 @@ impl PriorArgs {
     }
 
     fn sigma(&self, kind: PriorKind) -> f64 {
-        self.prior_sigma.unwrap_or(SIGMAS[usize::from(kind == PriorKind::Surface)])
+        self.prior_sigma.unwrap_or(kind.usual_sigma())
     }
 
     fn kind(&self) -> Option<PriorKind> {
@@ -81,14 +77,8 @@ impl PriorArgs {
             let reason = format!("{} has {w} x {h} pixels, LEFT {width} x {height}", path.display());
             return Err(Failure::usage("--prior", format!("{reason}; give a map of LEFT")));
         }
-        let known = map.data().iter().filter(|d| d.is_finite()).count();
-        let sparse = 100 * known <= SPARSE * map.data().len();
-        let kind = self.kind().unwrap_or(if sparse { PriorKind::Points } else { PriorKind::Surface });
-        let sigma = self.sigma(kind);
-        let prior = match kind {
-            PriorKind::Points => Prior::points_of(&map, sigma),
-            PriorKind::Surface => Prior::surface(&map, sigma),
-        };
+        let kind = self.kind().unwrap_or_else(|| PriorKind::of_map(&map));
+        let prior = Prior::map(kind, &map, self.sigma(kind));
         prior.map_err(|e| named(path, e))
     }
 

@@ -14,7 +14,7 @@ const CAPS: [u32; 2] = [20, 8];
 /// A deviation from a point that costs nothing, in 1/256 px. A surface has its standard deviation in the place of this.
 const POINT_DEAD: i32 = FRACTION / 2;
 /// The largest standard deviation with which a prior decides where no match can be trusted, in 1/256 px.
-const ANCHOR_SIGMA: u16 = 3 * FRACTION as u16 / 2;
+const ANCHOR_SIGMA: u16 = 11 * FRACTION as u16 / 4;
 
 /// The prior of each pixel for all levels of `plan`.
 pub(crate) fn levels(ready: &ReadyPrior, plan: &Plan) -> LevelPriors {

@@ -1,7 +1,11 @@
-//! The nearest of many points in the plane.
+//! The nearest of many points in the plane, in all directions.
 
-/// The number of neighbours that count.
+/// The number of directions.
 pub(super) const COUNT: usize = 8;
+/// Neighbours are at most this many times as far away as the third nearest.
+const FARTHEST: i32 = 4;
+/// Smallest distance of the third nearest that counts, in px.
+const LEAST: i32 = 4;
 
 /// A neighbour: its squared distance in px, and its index.
 pub(super) type Neighbour = (u32, u32);
@@ -39,44 +43,71 @@ impl<'a> Neighbours<'a> {
         Self { points, cell, columns, rows, starts, order }
     }
 
-    /// The up to [`COUNT`] points nearest to (x, y), at most `reach` px away, nearest first, those of lower index first on ties.
-    /// Cells are visited in squares around the point, until no cell can hold a nearer one.
-    pub(super) fn nearest(&self, (x, y): (i32, i32), reach: i32, found: &mut Vec<Neighbour>) {
-        found.clear();
+    /// The points nearest to (x, y), one in each of eight sectors, because the rows of a LiDAR are much farther apart than their points.
+    /// They are at most `reach` px away, and at most [`FARTHEST`] times as far as the third nearest; nearest first, those of lower
+    /// index first on ties. The point `but` is left out.
+    ///
+    /// Cells are visited in squares around the place, until no cell can hold a nearer point.
+    pub(super) fn nearest(
+        &self,
+        (x, y): (i32, i32),
+        reach: i32,
+        but: Option<u32>,
+        found: &mut Vec<Neighbour>,
+    ) {
+        let mut sectors = [(u32::MAX, u32::MAX); COUNT];
         let (column, row) = (x.div_euclid(self.cell), y.div_euclid(self.cell));
-        let rings = reach / self.cell + 1;
-        for ring in 0..=rings {
+        let mut most = squared(reach);
+        for ring in 0..=reach / self.cell + 1 {
             // Points of this square and beyond are at least this far away.
-            let least = (ring - 1).max(0) * self.cell;
-            if found.len() == COUNT && found[COUNT - 1].0 <= (least * least).cast_unsigned() {
+            let least = squared((ring - 1).max(0) * self.cell);
+            let farthest = sectors.iter().map(|near| near.0).max().unwrap_or(0);
+            if least > most || farthest <= least {
                 break;
             }
-            for v in row - ring..=row + ring {
+            for v in (row - ring).max(0)..=(row + ring).min(self.rows - 1) {
                 let is_edge = (v - row).abs() == ring;
-                let step = if is_edge || ring == 0 { 1 } else { 2 * ring };
+                let step = if is_edge { 1 } else { 2 * ring };
                 for u in (column - ring..=column + ring).step_by(step as usize) {
-                    if (0..self.columns).contains(&u) && (0..self.rows).contains(&v) {
-                        self.add_cell((v * self.columns + u) as usize, (x, y), reach, found);
+                    if (0..self.columns).contains(&u) {
+                        self.add_cell((v * self.columns + u) as usize, (x, y), but, &mut sectors);
                     }
                 }
             }
+            most = most.min(limit(&sectors));
         }
+        found.clear();
+        found.extend(sectors.iter().filter(|near| near.0 <= most));
+        found.sort_unstable();
     }
 
-    fn add_cell(&self, cell: usize, (x, y): (i32, i32), reach: i32, found: &mut Vec<Neighbour>) {
+    fn add_cell(&self, cell: usize, (x, y): (i32, i32), but: Option<u32>, sectors: &mut [Neighbour; COUNT]) {
         for &i in &self.order[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
             let (px, py) = self.points[i as usize];
-            let squared = ((px - x).pow(2) + (py - y).pow(2)).cast_unsigned();
-            if squared > reach.pow(2).cast_unsigned() {
-                continue;
-            }
-            let place = found.partition_point(|other| *other < (squared, i));
-            if place < COUNT {
-                found.truncate(COUNT - 1);
-                found.insert(place, (squared, i));
+            let (dx, dy) = (px - x, py - y);
+            if but != Some(i) {
+                let nearest = &mut sectors[sector(dx, dy)];
+                *nearest = (*nearest).min((squared(dx) + squared(dy), i));
             }
         }
     }
+}
+
+/// The sector of a direction.
+fn sector(dx: i32, dy: i32) -> usize {
+    4 * usize::from(dx >= 0) + 2 * usize::from(dy >= 0) + usize::from(dx.abs() > dy.abs())
+}
+
+/// The largest squared distance of a neighbour.
+fn limit(sectors: &[Neighbour; COUNT]) -> u32 {
+    let mut sorted = sectors.map(|near| near.0);
+    sorted.sort_unstable();
+    // Distances are below 2^14.
+    squared(FARTHEST).saturating_mul(sorted[2].max(squared(LEAST)))
+}
+
+fn squared(distance: i32) -> u32 {
+    distance.pow(2).cast_unsigned()
 }
 
 #[cfg(test)]
@@ -93,18 +124,25 @@ mod tests {
         for (size, count) in [((90, 60), 40), ((300, 20), 700), ((50, 50), 3)] {
             let points: Vec<_> = (0..count).map(|_| (random(size.0), random(size.1))).collect();
             let sorted = Neighbours::new(&points, (size.0 as usize, size.1 as usize));
-            for reach in [9_i32, 40] {
+            for reach in [9, 40] {
                 for _ in 0..200 {
                     let (x, y) = (random(size.0), random(size.1));
-                    let squared = |p: &(i32, i32)| ((p.0 - x).pow(2) + (p.1 - y).pow(2)).cast_unsigned();
-                    let mut all: Vec<Neighbour> =
-                        points.iter().zip(0..).map(|(p, i)| (squared(p), i)).collect();
-                    all.retain(|near| near.0 <= reach.pow(2).cast_unsigned());
+                    let mut sectors = [(u32::MAX, u32::MAX); COUNT];
+                    for (i, &(px, py)) in (0..).zip(&points) {
+                        let nearest = &mut sectors[sector(px - x, py - y)];
+                        *nearest = (*nearest).min((squared(px - x) + squared(py - y), i));
+                    }
+                    let most = limit(&sectors).min(squared(reach));
+                    let mut all: Vec<_> = sectors.into_iter().filter(|near| near.0 <= most).collect();
                     all.sort_unstable();
-                    all.truncate(COUNT);
                     let mut found = Vec::new();
-                    sorted.nearest((x, y), reach, &mut found);
+                    sorted.nearest((x, y), reach, None, &mut found);
                     assert_eq!(found, all);
+                    // Control: without the nearest, another one takes its place.
+                    if let Some(&(_, nearest)) = all.first() {
+                        sorted.nearest((x, y), reach, Some(nearest), &mut found);
+                        assert!(found != all && found.iter().all(|near| near.1 != nearest));
+                    }
                 }
             }
         }

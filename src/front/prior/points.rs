@@ -15,7 +15,7 @@ const AGREEING: usize = 2;
 /// Pixels in blocks of this side share their nearest points.
 const BLOCK: usize = 4;
 /// Difference of colour that lowers a weight by e, in 1/256 levels.
-const COLOUR: i64 = 8 << 8;
+const COLOUR: i64 = 4 << 8;
 /// Resolution of the exponent of weights.
 const STEPS: i64 = 16;
 /// The largest weight.
@@ -25,11 +25,11 @@ const NEAR_MEDIAN: i64 = FRACTION as i64;
 /// Largest deviation that counts for the standard deviation, in 1/256 px.
 const SPREAD_MOST: i64 = 8 * FRACTION as i64;
 /// Standard deviation of a pixel whose points agree perfectly and lie close, in 1/256 px.
-const SIGMA: i64 = FRACTION as i64;
+const SIGMA: i64 = FRACTION as i64 / 2;
 /// Growth of the standard deviation with the distance of the points, in 1/256 px per px.
 const GROWTH: i64 = 38;
 /// Pixels with a larger standard deviation remain unknown, in 1/256 px.
-const SIGMA_MOST: i64 = 8 * FRACTION as i64;
+const SIGMA_MOST: i64 = 4 * FRACTION as i64;
 /// Fractional bits of the slopes of planes.
 const SLOPE_BITS: u32 = 8;
 /// Largest slope of a plane, in px of disparity per px.
@@ -47,11 +47,10 @@ pub(super) fn cleaned(prior: &Prior) -> Prior {
     let agreed: Vec<bool> = (0..points.places.len())
         .into_par_iter()
         .map_init(Vec::new, |near, i| {
-            // The point itself is the first of them.
-            sorted.nearest(points.places[i], i32::MAX >> 17, near);
+            sorted.nearest(points.places[i], i32::MAX >> 17, Some(i as u32), near);
             let agrees = |&(squared, j): &Neighbour| {
                 let differ = i64::from(points.disparity[i] - points.disparity[j as usize]).abs();
-                j as usize != i && differ <= AGREES + distance(squared) * i64::from(FRACTION) / 10 / STEPS
+                differ <= AGREES + distance(squared) * i64::from(FRACTION) / 10 / STEPS
             };
             near.iter().filter(|near| agrees(near)).count() >= AGREEING
         })
@@ -65,7 +64,7 @@ pub(super) fn cleaned(prior: &Prior) -> Prior {
 
 /// Spreads the points of `prior` over `left`, the view that they are in.
 ///
-/// A plane is fitted through each point and its neighbours. For a pixel, the nearest points predict a disparity, each by its plane,
+/// A plane is fitted through each point and its neighbours. For a pixel, the nearest points in all directions predict a disparity, each by its plane,
 /// with weights that fall with distance and with the difference of colour. The disparity is the mean of the predictions close
 /// to their weighted median. The standard deviation grows with their deviations from that and with their distance.
 pub(super) fn spread(prior: &Prior, left: &Image) -> Prior {
@@ -76,7 +75,7 @@ pub(super) fn spread(prior: &Prior, left: &Image) -> Prior {
     let planes: Vec<[i64; 2]> = (0..points.places.len())
         .into_par_iter()
         .map_init(Vec::new, |near, i| {
-            sorted.nearest(points.places[i], REACH, near);
+            sorted.nearest(points.places[i], REACH, Some(i as u32), near);
             points.plane(i, near, &colours, &weights)
         })
         .collect();
@@ -87,7 +86,7 @@ pub(super) fn spread(prior: &Prior, left: &Image) -> Prior {
     rows.for_each_init(Vec::new, |near, (block, (disparity, sigma))| {
         for column in (0..width).step_by(BLOCK) {
             let top = BLOCK * block;
-            sorted.nearest(((column + BLOCK / 2) as i32, (top + BLOCK / 2) as i32), REACH, near);
+            sorted.nearest(((column + BLOCK / 2) as i32, (top + BLOCK / 2) as i32), REACH, None, near);
             if near.is_empty() {
                 continue;
             }
@@ -127,7 +126,7 @@ impl Points {
         let scale = scale(near);
         let (mut xx, mut xy, mut yy, mut xd, mut yd, mut sum) =
             (0_i128, 0_i128, 0_i128, 0_i128, 0_i128, 0_i128);
-        for &(squared, j) in near.iter().filter(|near| near.1 as usize != i) {
+        for &(squared, j) in near {
             let (px, py) = self.places[j as usize];
             let (away, (dx, dy)) = (distance(squared), (i128::from(px - x), i128::from(py - y)));
             let d = i64::from(self.disparity[j as usize] - self.disparity[i]);

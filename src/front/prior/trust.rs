@@ -1,7 +1,8 @@
 //! How well the images agree with a prior.
 //!
 //! At samples of the known pixels, the match at the known disparity is compared with matches at other disparities of the range. Of a
-//! wrong prior, half of the others match better. Of a right one few do, even where a scene is plain or hidden in part.
+//! wrong prior, half of the others match better. Of a right one few do. Samples count by how much their matches differ, because those of
+//! plain surfaces say nothing.
 
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
@@ -17,10 +18,12 @@ const FEW: usize = 16;
 const OTHERS: i32 = 16;
 /// Other disparities differ by more than this, in px.
 const NEAR: i32 = 2;
+/// Largest difference of matches that counts, in 1/256 levels summed over a window: 32 levels per pixel.
+const DIFFER_MOST: u32 = 25 * 32 * 256;
 /// Radius of the windows that are compared, in px.
 const RADIUS: i32 = 2;
 /// Share of better matches, in 1/256, up to which a prior is trusted fully, and from which on it is not trusted at all.
-const SHARES: [u32; 2] = [80, 120];
+const SHARES: [u64; 2] = [80, 108];
 
 /// The weight of `known` for `pair`, matched over `range`, in 1/256.
 pub(super) fn weight(known: &Prior, pair: &Pair, range: DisparityRange) -> u32 {
@@ -35,18 +38,21 @@ pub(super) fn weight(known: &Prior, pair: &Pair, range: DisparityRange) -> u32 {
         let others =
             (0..OTHERS).map(|i| range.min + span * i / (OTHERS - 1)).filter(|d| (d - own).abs() > NEAR);
         let costs: Vec<u32> = others.filter_map(cost).collect();
+        let least = costs.iter().copied().min()?.min(own_cost);
+        let most = costs.iter().copied().max()?.max(own_cost);
         // Ties count half.
-        let better: u32 =
-            costs.iter().map(|&other| 2 * u32::from(other < own_cost) + u32::from(other == own_cost)).sum();
-        (!costs.is_empty()).then(|| better * 128 / costs.len() as u32)
+        let better: u64 =
+            costs.iter().map(|&other| 2 * u64::from(other < own_cost) + u64::from(other == own_cost)).sum();
+        let says = u64::from((most - least).min(DIFFER_MOST));
+        Some((says * (better * 128 / costs.len() as u64), says))
     };
-    let shares: Vec<u32> = samples.par_iter().filter_map(better).collect();
-    if shares.len() < FEW {
+    let found: Vec<(u64, u64)> = samples.par_iter().filter_map(better).collect();
+    let (better, says) = found.iter().fold((0, 0), |sum, sample| (sum.0 + sample.0, sum.1 + sample.1));
+    if found.len() < FEW || says == 0 {
         return 256;
     }
-    let share = shares.iter().sum::<u32>() / shares.len() as u32;
     let [full, none] = SHARES;
-    256 * none.saturating_sub(share).min(none - full) / (none - full)
+    (256 * none.saturating_sub(better / says).min(none - full) / (none - full)) as u32
 }
 
 /// The sum of absolute differences of the windows around a left pixel and its match at disparity `d`, each less its mean; `None`
