@@ -1,8 +1,8 @@
 //! How well the images agree with a prior.
 //!
-//! At samples of the known pixels, the match at the known disparity is compared with matches at other disparities of the range. Of a
-//! wrong prior, half of the others match better. Of a right one few do. Samples count by how much their matches differ, because those of
-//! plain surfaces say nothing.
+//! At samples of the known pixels, the match at the known disparity is compared with matches at other disparities of the range. A right
+//! prior has the best match of all at many samples, a wrong one hardly ever. Samples count by how much their matches differ,
+//! because those of plain surfaces say nothing.
 
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
@@ -16,43 +16,47 @@ const SAMPLES: usize = 4096;
 const FEW: usize = 16;
 /// Number of other disparities per sample.
 const OTHERS: i32 = 16;
-/// Other disparities differ by more than this, in px.
-const NEAR: i32 = 2;
 /// Largest difference of matches that counts, in 1/256 levels summed over a window: 32 levels per pixel.
 const DIFFER_MOST: u32 = 25 * 32 * 256;
 /// Radius of the windows that are compared, in px.
 const RADIUS: i32 = 2;
-/// Share of better matches, in 1/256, up to which a prior is trusted fully, and from which on it is not trusted at all.
-const SHARES: [u64; 2] = [80, 108];
+/// Largest tolerance of a disparity, in px.
+const MOST_TOLERANCE: i32 = 8;
+/// Share of samples whose match is the best, in 1/256, from which on a prior is trusted fully, and up to which not at all.
+const SHARES: [u64; 2] = [90, 45];
 
 /// The weight of `known` for `pair`, matched over `range`, in 1/256.
 pub(super) fn weight(known: &Prior, pair: &Pair, range: DisparityRange) -> u32 {
     let all = known.count();
     let every = all.div_ceil(SAMPLES).max(1);
     let samples: Vec<_> = known.known().step_by(every).collect();
-    let better = |&((x, y), disparity, _): &((usize, usize), i32, u16)| {
-        let own = (disparity + FRACTION / 2).div_euclid(FRACTION);
-        let cost = |d: i32| (d - 1..=d + 1).filter_map(|d| unlikeness(pair, (x as i32, y as i32), d)).min();
-        let own_cost = cost(own)?;
-        let span = range.max - range.min;
-        let others =
-            (0..OTHERS).map(|i| range.min + span * i / (OTHERS - 1)).filter(|d| (d - own).abs() > NEAR);
-        let costs: Vec<u32> = others.filter_map(cost).collect();
-        let least = costs.iter().copied().min()?.min(own_cost);
-        let most = costs.iter().copied().max()?.max(own_cost);
-        // Ties count half.
-        let better: u64 =
-            costs.iter().map(|&other| 2 * u64::from(other < own_cost) + u64::from(other == own_cost)).sum();
-        let says = u64::from((most - least).min(DIFFER_MOST));
-        Some((says * (better * 128 / costs.len() as u64), says))
-    };
-    let found: Vec<(u64, u64)> = samples.par_iter().filter_map(better).collect();
-    let (better, says) = found.iter().fold((0, 0), |sum, sample| (sum.0 + sample.0, sum.1 + sample.1));
+    let found: Vec<_> = samples.par_iter().filter_map(|&sample| compared(sample, pair, range)).collect();
+    let says: u64 = found.iter().map(|(says, _)| says).sum();
+    let best: u64 = found.iter().filter(|(_, is_best)| *is_best).map(|(says, _)| says).sum();
     if found.len() < FEW || says == 0 {
         return 256;
     }
     let [full, none] = SHARES;
-    (256 * none.saturating_sub(better / says).min(none - full) / (none - full)) as u32
+    (256 * (256 * best / says).saturating_sub(none).min(full - none) / (full - none)) as u32
+}
+
+/// How much the matches of a known pixel differ, squared, and whether that at its disparity is the best.
+fn compared(
+    ((x, y), disparity, sigma): ((usize, usize), i32, u16),
+    pair: &Pair,
+    range: DisparityRange,
+) -> Option<(u64, bool)> {
+    let own = (disparity + FRACTION / 2).div_euclid(FRACTION);
+    let tolerance = (1 + i32::from(sigma) / FRACTION).min(MOST_TOLERANCE);
+    let around = |d: i32| (d - tolerance..=d + tolerance);
+    let cost = |d: i32| around(d).filter_map(|d| unlikeness(pair, (x as i32, y as i32), d)).min();
+    let own_cost = cost(own)?;
+    let span = range.max - range.min;
+    let others = (0..OTHERS).map(|i| range.min + span * i / (OTHERS - 1));
+    let far = others.filter(|d| (d - own).abs() > 2 * tolerance).filter_map(cost);
+    let (least, most) = far.fold((u32::MAX, 0), |(least, most), cost| (least.min(cost), most.max(cost)));
+    let says = u64::from((most.max(own_cost).checked_sub(least.min(own_cost))?).min(DIFFER_MOST) / 256);
+    (most > 0).then_some((says * says, own_cost < least))
 }
 
 /// The sum of absolute differences of the windows around a left pixel and its match at disparity `d`, each less its mean; `None`
