@@ -448,7 +448,7 @@ class Match(unittest.TestCase):
     def test_what_makes_no_sense_is_an_exception(self):
         left, right = pair()
         for error, words, call in (
-            (ValueError, "one size", lambda: mrfgs.match(left, right[:, 1:].copy(), 15)),
+            (ValueError, "the same size", lambda: mrfgs.match(left, right[:, 1:].copy(), 15)),
             (ValueError, "height, width", lambda: mrfgs.match(left[0, 0], right, 15)),
             (ValueError, "1 to 4 channels", lambda: mrfgs.match(np.dstack([left, left]), right, 15)),
             (ValueError, "has pixels", lambda: mrfgs.match(left[:0], right[:0], 15)),
@@ -597,7 +597,7 @@ class Match(unittest.TestCase):
             (ValueError, f"threads: give an integer from {most}, or None, not -1", lambda: mrfgs.Matcher(device="cpu", threads=-1)),
             (TypeError, f"threads: give an integer from {most}, or None, not '2'", lambda: mrfgs.match(left, right, 15, device="cpu", threads="2")),
             (TypeError, "threads: give an integer", lambda: mrfgs.Matcher(device="cpu", threads=1.5)),
-            (ValueError, f"threads: {2**63 - 1} threads cannot be had; give {most}", lambda: mrfgs.Matcher(device="cpu", threads=10**30)),
+            (ValueError, f"threads: {2**63 - 1} threads are not possible; give {most}", lambda: mrfgs.Matcher(device="cpu", threads=10**30)),
             (TypeError, "options: keys must be names of options, such as \"fill\" (see mrfgs.options()), not 3",
              lambda: matcher.match(left, right, 15, options={3: 4})),
             (TypeError, 'options["cost"]: keys must be names of options', lambda: matcher.match(left, right, 15, options={"cost": {None: 4}})),
@@ -1635,7 +1635,7 @@ class Sequences(Folder):
             self.refused(error, words, go)
             self.assertEqual(len(found), 1)
         # Errors of the match itself.
-        self.refused(ValueError, "pair 0: the views have too few matches", lambda: list(self.matcher.match_all([(left * 0, right * 0)])))
+        self.refused(ValueError, "pair 0: no range of disparities found", lambda: list(self.matcher.match_all([(left * 0, right * 0)])))
         self.refused(ValueError, "pair 0: memory: 1 MiB", lambda: list(self.matcher.match_all([(left, right)], 15, options={"memory": 1})))
         # Errors before any pair is read.
         taken = iter([(left, right)])

@@ -348,8 +348,8 @@ fn images_of_another_size_are_reported() {
         fs::write(folder.join(name), text.replacen("[ 240, 180 ]", size, 1)).unwrap();
     }
     let images = "rectify @raw/left.png @raw/right.png";
-    let words = "half.yml: is for images of 120 x 90: those of 240 x 180 count as the same, scaled; if they show another part, say \
-                 which by --calib-crop";
+    let words = "half.yml: is for images of 120 x 90: those of 240 x 180 count as the same, scaled; if they show another part, give \
+                 it with --calib-crop";
     run(&folder, &format!("{images} half --calib half.yml")).succeeded().says(words);
     run(&folder, &format!("{images} fits --calib fits.yml")).succeeded().is_silent_on("is for images of");
     run(&folder, &format!("{images} odd --calib odd.yml"))
@@ -367,7 +367,7 @@ fn images_of_another_size_are_reported() {
         .says("480 x 360 count as the same, scaled");
     assert!(differing(&folder, "two/im0.png", "fits/im0.png") == 0.0);
     assert!(differing(&folder, "two/mask1.png", "fits/mask1.png") < 0.05, "the right view shows as much");
-    run(&folder, "rectify @raw/left.png right.png alone").failed(1, "right.png is 480 x 360 & one size");
+    run(&folder, "rectify @raw/left.png right.png alone").failed(1, "right.png is 480 x 360 & the same size");
     // So are both views in one file.
     let jpegs = [scene("raw/left.png"), folder.join("right.png")].map(|view| {
         let mut file = std::io::Cursor::new(Vec::new());
@@ -386,8 +386,10 @@ fn images_of_another_size_are_reported() {
     alike(&folder.join("files"), &folder.join("one"), "both views in one file");
     let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
     assert!(bytes("files-d.pfm") == bytes("one-d.pfm"));
-    run(&folder, "rectify both.mpo alone").failed(1, "the right view in both.mpo is 480 x 360 & one size");
-    run(&folder, "match both.mpo d.pfm --max-disparity 31").failed(1, "both.mpo is 480 x 360 & one size");
+    run(&folder, "rectify both.mpo alone")
+        .failed(1, "the right view in both.mpo is 480 x 360 & the same size");
+    run(&folder, "match both.mpo d.pfm --max-disparity 31")
+        .failed(1, "both.mpo is 480 x 360 & the same size");
 }
 
 /// An MPO file of two JPEG files.
@@ -424,7 +426,7 @@ fn an_implausible_unit_is_reported() {
         let line = "match @slanted/im0.png @slanted/im1.png OUT --also depth-mm --calib left --calib right --max-disparity 23";
         run(&folder, &line.replace("OUT", out)).succeeded()
     };
-    let remedy = "& say the right one in the file by an entry `unit`: mm, cm or m";
+    let remedy = "& give the right one in the file as an entry `unit`: mm, cm or m";
     depth(&ros("-34.48"), "d.pfm").is_silent_on("apart");
     depth(&ros("-0.03448"), "small.pfm").says(&format!("warning & 0.00016 m apart {remedy}"));
     depth(&ros("-34480"), "large.pfm").says(&format!("warning & 160 m apart {remedy}"));

@@ -39,7 +39,7 @@ const FAILURES: &[Failure] = &[
     (
         "match a.gif right.png out.pfm --max-disparity 9",
         1,
-        "a.gif & is a GIF image, which is not read here: convert it to PNG",
+        "a.gif & is a GIF image, which is not supported: convert it to PNG",
     ),
     ("match left.png a.jpg out.pfm --max-disparity 9", 1, "a.jpg & ends too early & get the file again"),
     ("match left.png a.pgm out.pfm --max-disparity 9", 1, "a.pgm & truncated & get the file again"),
@@ -50,9 +50,13 @@ const FAILURES: &[Failure] = &[
         1,
         "palette.tif & the TIFF palette is missing & convert it to PNG",
     ),
-    ("match left.png unknown.pfm out.pfm --max-disparity 9", 1, "unknown.pfm is 1 x 1 & one size"),
-    ("match unknown.pfm dot.png out.pfm --max-disparity 0", 1, "unknown.pfm holds float values & one format"),
-    ("M out.pfm --mask narrow.png", 1, "narrow.png is 30 x 40 & a mask has the size of the left image"),
+    ("match left.png unknown.pfm out.pfm --max-disparity 9", 1, "unknown.pfm is 1 x 1 & the same size"),
+    (
+        "match unknown.pfm dot.png out.pfm --max-disparity 0",
+        1,
+        "unknown.pfm holds floats & dot.png holds whole numbers & the same format",
+    ),
+    ("M out.pfm --mask narrow.png", 1, "narrow.png is 30 x 40 & a mask must have the size of the left image"),
     ("M out.pfm --mask none.png", 1, "none.png & check the name"),
     ("M out.pfm --mask text.png", 1, "text.png & give PNG"),
     // Outputs.
@@ -117,8 +121,12 @@ const FAILURES: &[Failure] = &[
         "--json & the calibration file & another name",
     ),
     // The range.
-    ("match flat.png flat.png out.pfm", 1, "too few matches & all one colour"),
-    ("match flat.png flat.png out.pfm --max-disparity auto", 1, "too few matches & all one colour"),
+    ("match flat.png flat.png out.pfm", 1, "no range of disparities found & all one colour"),
+    (
+        "match flat.png flat.png out.pfm --max-disparity auto",
+        1,
+        "no range of disparities found & all one colour",
+    ),
     ("M out.pfm --memory 2", 2, "--memory <SIZE> & '2' & 2GiB & --help"),
     ("M out.pfm --memory 1.5GiB", 2, "--memory <SIZE> & '1.5GiB' & whole number"),
     ("M out.pfm --memory 0MiB", 2, "--memory <SIZE> & from 1MiB to 16TiB"),
@@ -176,7 +184,7 @@ const FAILURES: &[Failure] = &[
     (
         "match flat.png flat.png out.pfm --rectify",
         1,
-        "flat.png, flat.png & 0 of 0 agree & one scene & --calib",
+        "flat.png, flat.png & 0 of 0 matches agree & the same scene & --calib",
     ),
     ("R --calib @raw/cameras.yml --alpha 1", 2, "--alpha & --rectify"),
     ("R --rectify --calib @raw/cameras.yml --alpha 2", 2, "--alpha & from 0 to 1"),

@@ -361,7 +361,7 @@ fn files_that_are_no_images_are_refused() {
         (
             "a.png",
             b"GIF89a.....................",
-            "is a GIF image, which is not read here: convert it to PNG",
+            "is a GIF image, which is not supported: convert it to PNG",
         ),
         ("huge.pgm", b"P5\n4000000000 4000000000\n255\n", "at most"),
         ("none.pgm", b"P5\n0 5\n255\n", ""),
