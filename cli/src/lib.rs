@@ -37,14 +37,14 @@ const ABOUT: &str = "\
 Turns two photos of a scene into a depth map, the same on every GPU and CPU.
 
 Take the second photo a step to the side of the first. Near things then shift farther between the two photos than distant things. \
-The map has this shift for every pixel of the left photo, in pixels: its disparity. If the cameras are calibrated, you also get depth in \
-metres and points.";
+The map has this shift for every pixel of the left photo, in pixels: its disparity. If the cameras are calibrated, you also get depths and \
+points.";
 
 const EXAMPLES: &str = "\
 Examples:
   # Two hand-held photos; map.preview.png shows the map in colours:
   mrfgs match a.jpg b.jpg map.pfm --rectify --also preview
-  # The same with a built-in pair:
+  # Try it on a built-in pair:
   mrfgs demo
   # Images of a calibrated rig, with depth:
   mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth

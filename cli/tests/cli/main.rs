@@ -35,7 +35,6 @@ mod report;
 mod results;
 mod robust;
 #[path = "../../../testdata/scenes.rs"]
-#[allow(dead_code, reason = "the examples of the guide take one scene")]
 mod scenes;
 mod sequences;
 mod steady;

@@ -340,7 +340,7 @@ fn mismatched_images_are_refused() {
     refused(pair(&left, &small, None), &["left.png is 4 x 3", "small.png is 2 x 3"]);
     refused(pair(&left, &left, Some(&small)), &["small.png is 2 x 3", "left.png is 4 x 3", "mask"]);
     let float = f.tiff::<colortype::Gray32Float>("float.tif", &[0.0; N]);
-    refused(pair(&left, &float, None), &["left.png", "float.tif", "one format"]);
+    refused(pair(&left, &float, None), &["left.png", "float.tif", "the same format"]);
 }
 
 #[test]
