@@ -1,5 +1,5 @@
 {
-  description = "Dense disparity maps from stereo pairs, with the same bits on every device";
+  description = "Depth from two images, with the same bits on every device";
 
   inputs.nixpkgs.url = "github:NixOS/nixpkgs/nixos-unstable";
 
@@ -43,7 +43,7 @@
               patchelf --add-rpath ${lib.makeLibraryPath [ pkgs.vulkan-loader ]} $out/bin/mrfgs
             '';
             meta = {
-              description = "Dense disparity maps from stereo pairs, with the same bits on every device";
+              description = "Depth from two images, with the same bits on every device";
               license = with lib.licenses; [
                 mit
                 asl20

@@ -40,7 +40,7 @@ impl Rig {
                 [("cam0", camera.is_some()), ("doffs", doffs.is_some()), ("baseline", baseline.is_some())];
             let missing: Vec<_> = known.iter().filter(|(_, known)| !known).map(|(key, _)| *key).collect();
             return error(format!(
-                "does not say {}; depth takes cam0=[f 0 cx; 0 f cy; 0 0 1], doffs=N and baseline=N",
+                "lacks {}; depth needs cam0=[f 0 cx; 0 f cy; 0 0 1], doffs=N and baseline=N",
                 missing.join(" and ")
             ));
         };
@@ -306,9 +306,9 @@ mod tests {
             let error = Rig::new(&calibration).unwrap_err().to_string();
             assert!(words.iter().all(|word| error.contains(word)), "{error}");
         };
-        refused(|c| c.camera = None, &["does not say cam0;"]);
-        refused(|c| c.doffs = None, &["does not say doffs;"]);
-        refused(|c| (c.camera, c.baseline) = (None, None), &["does not say cam0 and baseline;"]);
+        refused(|c| c.camera = None, &["lacks cam0;"]);
+        refused(|c| c.doffs = None, &["lacks doffs;"]);
+        refused(|c| (c.camera, c.baseline) = (None, None), &["lacks cam0 and baseline;"]);
         refused(|c| c.baseline = Some(0.0), &["baseline=0 is not above 0"]);
     }
 }

@@ -64,7 +64,7 @@ pub enum Error {
     #[error("the calibration {0}")]
     Calibration(String),
     /// The pair cannot be rectified by its own matches.
-    #[error("the pair cannot be rectified by its matches: {0}")]
+    #[error("the pair cannot be rectified without a calibration: {0}")]
     Rectification(#[from] RectificationError),
     /// Images, masks, maps or regions do not fit together.
     #[error("{0}")]
@@ -85,7 +85,7 @@ pub enum Error {
 #[non_exhaustive]
 pub enum ReadError {
     /// Its header claims more pixels than the reader's limit.
-    #[error("claims {width} x {height} pixels and at most {limit} are read")]
+    #[error("claims {width} x {height} pixels, but at most {limit} are read")]
     TooManyPixels {
         /// Columns.
         width: u64,
@@ -95,22 +95,22 @@ pub enum ReadError {
         limit: u64,
     },
     /// It is larger than any image within the reader's limit.
-    #[error("has more bytes than {limit} pixels can take")]
+    #[error("is larger than any image of {limit} pixels, the limit")]
     TooManyBytes {
         /// Most pixels that are read.
         limit: u64,
     },
     /// A disparity map was read from whole numbers, whose scale is unknown.
     #[error(
-        "holds whole numbers, which do not tell the scale of its disparities; disparity maps are .pfm, float .tif or .npy, or \
+        "holds whole numbers, and their scale is unknown; disparity maps are .pfm, float .tif or .npy, or \
          16-bit .png with disparity times 256"
     )]
     UnknownScale,
     /// A scale was given for a disparity map of floats.
-    #[error("holds disparities in pixels, and only whole numbers need a scale")]
+    #[error("holds disparities in pixels; only whole numbers need a scale")]
     NeedlessScale,
     /// The file's no-data value is not a number.
-    #[error("has the no-data value {value}, which is no number")]
+    #[error("has the no-data value {value}, which is not a number")]
     NoData {
         /// The value in the file.
         value: String,
@@ -289,7 +289,7 @@ pub enum RangeError {
         max: i32,
     },
     /// A disparity is too far from 0.
-    #[error("{disparity} is out of reach: disparities are within {limit} px of 0")]
+    #[error("{disparity} is too far from 0: disparities are within {limit} px of it")]
     TooFar {
         /// The disparity.
         disparity: i32,
@@ -297,7 +297,7 @@ pub enum RangeError {
         limit: i32,
     },
     /// The range has too many labels.
-    #[error("{min} to {max} are {} labels and at most {limit} fit", i64::from(*max) - i64::from(*min) + 1)]
+    #[error("{min} to {max} are {} disparities, but at most {limit} can be searched", i64::from(*max) - i64::from(*min) + 1)]
     TooManyLabels {
         /// The smallest disparity.
         min: i32,
@@ -307,7 +307,7 @@ pub enum RangeError {
         limit: usize,
     },
     /// Every disparity of the range leads outside the images.
-    #[error("no disparity from {min} to {max} is inside images {width} pixels wide")]
+    #[error("images {width} pixels wide have no matches at disparities from {min} to {max}")]
     OutsideImages {
         /// The smallest disparity.
         min: i32,
@@ -317,20 +317,14 @@ pub enum RangeError {
         width: usize,
     },
     /// No range was given, and the sparse matches are too few to find it. After rectification by its own matches, the pair has enough.
-    #[error(
-        "the views have too few matches on the same rows to find the range of disparities, because they are not rectified"
-    )]
+    #[error("no range of disparities found: the pair is not rectified, so matches are not on the same rows")]
     NotRectified,
     /// No range was given, and the sparse matches are too few to find it.
-    #[error("the views have too few matches to find the range of disparities{}", after_colon(cause.as_deref()))]
+    #[error("no range of disparities found: {}", cause.as_deref().unwrap_or("the two images have too few matches"))]
     NotFound {
         /// The reason, with its remedy, where the pair itself is at fault.
         cause: Option<String>,
     },
-}
-
-fn after_colon(cause: Option<&str>) -> String {
-    cause.map_or_else(String::new, |cause| format!(": {cause}"))
 }
 
 /// Why a pair cannot be rectified by its own matches.
@@ -338,7 +332,9 @@ fn after_colon(cause: Option<&str>) -> String {
 #[non_exhaustive]
 pub enum RectificationError {
     /// Too few matches agree on the pose of the cameras.
-    #[error("{agreeing} of {matches} agree on how the camera moved, and {least} are needed, and half of all")]
+    #[error(
+        "only {agreeing} of {matches} matches agree on how the camera moved, but at least {least} and half of all must"
+    )]
     Few {
         /// Matches that agree.
         agreeing: usize,
@@ -348,10 +344,10 @@ pub enum RectificationError {
         least: usize,
     },
     /// All matches fit one plane, or a camera that only rotated.
-    #[error("they show no depth, but one flat surface, or a camera that turned on the spot")]
+    #[error("the images show no depth: they show one flat surface, or the camera only turned")]
     Flat,
     /// The camera moved forward or backward.
-    #[error("the camera moved towards what it shows, or away from it, and not to the side")]
+    #[error("the camera moved forward or back instead of to the side")]
     Forward,
 }
 
@@ -368,7 +364,7 @@ pub enum ExecutionError {
         present: Vec<String>,
     },
     /// The number of threads is outside its limits.
-    #[error("{wanted} threads cannot be had; give 1 to {most}")]
+    #[error("{wanted} threads are not possible; give 1 to {most}")]
     ThreadCount {
         /// How many were asked for.
         wanted: usize,
@@ -380,7 +376,7 @@ pub enum ExecutionError {
     Threads(String),
     /// When this process was forked, another thread of the parent was using the object.
     #[error(
-        "another thread was using this when the process was forked, so that it is lost here: make it anew"
+        "another thread was using this object when the process was forked, so it is of no use here: make a new one"
     )]
     Forked,
 }
@@ -391,7 +387,7 @@ pub enum ExecutionError {
 pub enum BudgetError {
     /// Even the smallest tiles need more.
     #[error(
-        "{memory} MiB of memory is too little for {width} x {height} pixels and {labels} labels: the smallest tiles need \
+        "{memory} MiB of memory is too little for {width} x {height} pixels and {labels} disparities: the smallest tiles need \
          {needed} MiB"
     )]
     NoTileFits {
@@ -407,9 +403,7 @@ pub enum BudgetError {
         needed: u64,
     },
     /// The steps of a match are inspected, and the memory does not hold all its volumes.
-    #[error(
-        "only a match in one piece with all of its volumes in memory can show its steps: that needs {needed} MiB"
-    )]
+    #[error("to show the steps of a match, all of it must be in memory at once: that needs {needed} MiB")]
     Steps {
         /// The memory that suffices.
         needed: u64,
@@ -430,14 +424,14 @@ pub enum DeviceError {
     )]
     Forked,
     /// The device gives wrong maps for a small test pair.
-    #[error("{name} disagrees with the CPU path on the self-test")]
+    #[error("{name} fails the self-test: its maps differ from those of the CPU")]
     WrongMaps {
         /// The device.
         name: String,
     },
     /// The match needs more iterations of a loop than is safe with a driver.
     #[error(
-        "{width} x {height} pixels and {labels} labels with {neighbours} neighbours are too many for one invocation of \
+        "{width} x {height} pixels and {labels} disparities with {neighbours} neighbours are too many for one invocation of \
          the shader `{shader}`"
     )]
     TooLargeForShader {
@@ -468,9 +462,9 @@ pub enum DeviceError {
 pub enum MemoryError {
     /// The machine has too little memory, or denies it to this process.
     #[error(
-        "{} of memory are needed and {}",
+        "{} of memory are needed, but {}",
         size(*needed),
-        available.map_or("cannot be had".into(), |free| format!("{} are free", size(free)))
+        available.map_or("the system refuses them".into(), |free| format!("{} are free", size(free)))
     )]
     Machine {
         /// Bytes that are needed.
@@ -481,7 +475,7 @@ pub enum MemoryError {
         purpose: Purpose,
     },
     /// The device has too little memory for the match.
-    #[error("the match needs {} of memory and {name} has {}", size(*needed), size(*available))]
+    #[error("the match needs {} of memory, but {name} has {}", size(*needed), size(*available))]
     Device {
         /// The device.
         name: String,
@@ -491,7 +485,7 @@ pub enum MemoryError {
         available: u64,
     },
     /// A buffer, or one binding of it, is larger than the device allows.
-    #[error("a buffer for {what} takes {} and {name} allows {}", size(*needed), size(*allowed))]
+    #[error("a buffer for {what} takes {}, but {name} allows at most {}", size(*needed), size(*allowed))]
     Buffer {
         /// The device.
         name: String,

@@ -55,7 +55,7 @@ pub struct Vocabulary {
     pub calibration: &'static str,
     /// The option that turns images upright.
     pub orient: Option<&'static str>,
-    /// The option that rectifies a pair.
+    /// How to rectify a pair, as an instruction.
     pub rectify: Option<&'static str>,
     /// What to do about a wrong unit.
     pub unit: Option<&'static str>,
@@ -111,13 +111,14 @@ pub fn error(error: &Error, words: &Vocabulary) -> String {
 
 /// A warning with its remedy.
 #[must_use]
-pub fn warning(warning: &Warning, Vocabulary { min, max, mask, orient, rectify, .. }: &Vocabulary) -> String {
+pub fn warning(warning: &Warning, words: &Vocabulary) -> String {
+    let Vocabulary { min, max, mask, orient, .. } = words;
     let remedy = match warning {
-        Warning::Oriented { .. } => and(": turn them upright by ", *orient),
-        Warning::NotRectified { .. } => and(": use ", *rectify),
+        Warning::Oriented { .. } => and(": turn them upright with ", *orient),
+        Warning::NotRectified { .. } => format!(": {}", words.rectified()),
         Warning::Saturated { .. } => format!(": expose both alike{}", and(", or ", *mask)),
         Warning::Swapped { .. } => {
-            format!(": exchange the two images, or lower {min} below 0 if the cameras converge")
+            format!(": swap the two images, or lower {min} below 0 if the cameras converge")
         }
         Warning::Clipped { upper: true, .. } => format!(": raise {max}"),
         Warning::Clipped { upper: false, .. } => format!(": lower {min}"),
@@ -131,7 +132,7 @@ pub fn warning(warning: &Warning, Vocabulary { min, max, mask, orient, rectify, 
 pub fn of_rectified(warning: &Warning, calibrated: bool, words: &Vocabulary) -> String {
     let Warning::NotRectified { offset } = warning else { return self::warning(warning, words) };
     let why = if calibrated {
-        "the calibration is not of these cameras as they are now, or not of images of this size"
+        "the calibration is out of date, or for images of another size: calibrate the cameras again"
     } else {
         "the lens may bend lines, or the scene has moved: calibrate the cameras"
     };
@@ -144,10 +145,10 @@ pub fn of_rectified(warning: &Warning, calibrated: bool, words: &Vocabulary) -> 
 #[must_use]
 pub fn doubt(doubt: &Doubt, Vocabulary { unit, crop, .. }: &Vocabulary) -> String {
     let remedy = match doubt {
-        Doubt::OtherSize { .. } => and("; if they show another part, say which by ", *crop),
+        Doubt::OtherSize { .. } => and("; if they show another part, give it with ", *crop),
         Doubt::Baseline { .. } => and(": ", *unit),
         Doubt::FocalLength { .. } => {
-            ": give it in pixels, which are the millimetres by the width of a pixel on the sensor".into()
+            ": give it in pixels: the millimetres divided by the width of one pixel on the sensor".into()
         }
         _ => String::new(),
     };
@@ -183,15 +184,20 @@ impl Vocabulary {
             RangeError::OutsideImages { .. } => (max, ": give a range that fits the pair".into()),
             RangeError::NotFound { cause: Some(_) } => return cause.to_string(),
             RangeError::NotFound { cause: None } => {
-                return format!("{cause}: check that both show one scene, or give {}", self.given_range());
+                let range = self.given_range();
+                return format!("{cause}: check that both show the same scene, or give {range}");
             }
             RangeError::NotRectified => {
-                let by = and(" by ", self.rectify);
-                return format!("{cause}: rectify the pair{by}, or give {}", self.given_range());
+                return format!("{cause}: {}, or give {}", self.rectified(), self.given_range());
             }
             RangeError::TooFar { .. } => (max, String::new()),
         };
         format!("{}: {cause}{remedy}", range.unwrap_or(end))
+    }
+
+    /// How to rectify a pair.
+    fn rectified(&self) -> &'static str {
+        self.rectify.unwrap_or("rectify it first, with or without a calibration")
     }
 
     /// The option that gives a range.
@@ -227,12 +233,12 @@ impl Vocabulary {
     fn rectification(&self, cause: &RectificationError) -> String {
         let first = match cause {
             RectificationError::Few { .. } => {
-                "check that both images show one scene from places near each other"
+                "check that both images show the same scene, taken from nearby places"
             }
             RectificationError::Flat => {
-                "step to the side between the photographs, and show things at different distances"
+                "step to the side between the two photos, and show things at different distances"
             }
-            RectificationError::Forward => "step to the side between the photographs",
+            RectificationError::Forward => "step to the side between the two photos",
         };
         format!("{first}, or give {}", self.calibration)
     }
@@ -240,11 +246,11 @@ impl Vocabulary {
     fn reading(&self, cause: &ReadError) -> String {
         let raised = || self.max_pixels.map_or_else(String::new, |pixels| format!("raise {pixels} or "));
         match cause {
-            ReadError::TooManyPixels { .. } => format!("; if that is true, {}crop it", raised()),
+            ReadError::TooManyPixels { .. } => format!("; if it really is that large, {}crop it", raised()),
             ReadError::TooManyBytes { .. } => format!("; {}crop it", raised()),
-            ReadError::UnknownScale => and("; give the scale by ", self.truth_scale),
+            ReadError::UnknownScale => and("; give the scale with ", self.truth_scale),
             ReadError::NeedlessScale => and("; remove ", self.truth_scale),
-            ReadError::NoData { .. } => and("; give one by ", self.no_data),
+            ReadError::NoData { .. } => and("; give one with ", self.no_data),
             ReadError::Option { cause, .. } => self.of_key(cause),
             ReadError::Memory(cause) => self.memory(cause),
             ReadError::Other(_) => String::new(),
@@ -270,7 +276,7 @@ impl Vocabulary {
                     return format!(": {cpu}, or use a smaller image or a narrower range");
                 };
                 format!(
-                    ": allow less by {memory}, or use a smaller image, a narrower range ({min}, {max}) or fewer \
+                    ": give a smaller {memory}, or use a smaller image, a narrower range ({min}, {max}) or fewer \
                      neighbours (a higher {})",
                     self.key("percentile")
                 )

@@ -288,6 +288,6 @@ fn ranges_that_cannot_be_doubled_are_refused_before_anything_runs() {
     let (mut cpu, pair) = (Cpu::default(), pair.unwrap());
     let solved = common::solve(&mut cpu, &plan, &pair, observer);
     let Err(Error::Range(error)) = solved else { panic!("it is refused") };
-    assert_eq!(error.to_string(), "-4000 to 5000 are 9001 labels and at most 8192 fit");
+    assert_eq!(error.to_string(), "-4000 to 5000 are 9001 disparities, but at most 8192 can be searched");
     assert_eq!(begun, 0);
 }

@@ -283,7 +283,7 @@ fn rigs_that_cannot_be_rectified_are_refused() {
     };
     let default = Options::default();
     refused(&|_, _| (), default, (241, 180), "is for images of 240 x 180");
-    refused(&|_, _| (), Options { alpha: Some(1.5), ..default }, SIZE, "alpha of 0 to 1");
+    refused(&|_, _| (), Options { alpha: Some(1.5), ..default }, SIZE, "alpha from 0 to 1");
     let forward = |cameras: &mut [Camera; 2], _: &mut f64| {
         for camera in cameras {
             camera.turn = raw::product(&[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]], &camera.turn);

@@ -571,14 +571,17 @@ fn identical_images_are_warned_about() {
 fn warnings_are_one_line_with_the_cause() {
     for (warning, words) in [
         (Warning::Identical, ["the same", "right view"]),
-        (Warning::NotRectified { offset: 512 }, ["2.0 px", "rectify"]),
+        (Warning::NotRectified { offset: 512 }, ["2.0 px", "not rectified"]),
         (Warning::Turned { how: "upside down" }, ["upside down", "turn it back"]),
         (Warning::Sideways, ["same column", "turn both"]),
         (
             Warning::Copied { part: Part::Columns { first: 0, last: 9, of: 20 } },
             ["in columns 0 to 9 of 20", "wrote"],
         ),
-        (Warning::Blurred { view: "left", part: Part::Whole }, ["the left view lacks", "everywhere"]),
+        (
+            Warning::Blurred { view: "left", part: Part::Whole },
+            ["the left view has far less detail", "everywhere"],
+        ),
         (Warning::Torn { part: Part::Rows { first: 4, last: 9, of: 10 } }, ["in rows 4 to 9 of 10", "torn"]),
         (Warning::LittleLeft { percent: 4, masked: 85 }, ["only 4 %", "covers 85 %"]),
         (Warning::Swapped { percent: 97 }, ["97 %", "seem to be swapped"]),

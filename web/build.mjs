@@ -63,7 +63,7 @@ const page = await bundle(['page.ts', 'style.css'], {
 const names = { page: page('page.ts'), style: page('style.css') };
 /** Links to the source and the guide, if the repository has an address. */
 const source = readFileSync(join(root, 'Cargo.toml'), 'utf8').match(/^repository = "(.*)"$/m)?.[1];
-names.links = source ? `    <a href="${source}">Source</a>\n    <a href="${source}/blob/main/docs/guide.md">Guide</a>\n` : '';
+names.links = source ? `    <a href="${source}">Source</a>\n    <a href="${source}/tree/main/docs/guide">Guide</a>\n` : '';
 const html = readFileSync(join(root, 'web/page/index.html'), 'utf8').replace(/\{\{(\w+)\}\}/g, (_, name) => names[name]);
 writeFileSync(join(out, 'index.html'), html);
 copyFileSync(join(root, 'web/page/icon.svg'), join(out, 'icon.svg'));

@@ -269,7 +269,7 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     bad = image, bad.stride = SIZE_MAX / 2;
     refused(wrong, mrfgs_match(matcher, &bad, &image, &range, &maps), "left", "too large for memory");
     bad = image, bad.width -= 1;
-    refused(wrong, mrfgs_match(matcher, &image, &bad, &range, &maps), "one size", "121");
+    refused(wrong, mrfgs_match(matcher, &image, &bad, &range, &maps), "the same size", "121");
     bad = image, bad.height = 0;
     refused(wrong, mrfgs_match(matcher, &bad, &bad, &range, &maps), "has no pixels", "0");
     mrfgs_range empty = {5, 4}, far = {0, 1 << 30};

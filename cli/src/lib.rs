@@ -34,23 +34,30 @@ use failure::Failure;
 pub use pairs::list;
 
 const ABOUT: &str = "\
-Turns two photos of a scene into a disparity or depth map, the same on every GPU and CPU.
+Turns two photos of a scene into a depth map, the same on every GPU and CPU.
 
-Disparity says how far each pixel of the left image moves to the left in the right image: \
-left (x, y) with disparity d appears at right (x - d, y). Near objects move farther.";
+Take the second photo a step to the side of the first. Near things then shift farther between the two photos than distant things. \
+The map has this shift for every pixel of the left photo, in pixels: its disparity. If the cameras are calibrated, you also get depths and \
+points.";
 
 const EXAMPLES: &str = "\
 Examples:
-  mrfgs demo                                  # try it on a built-in pair
-  mrfgs match a.jpg b.jpg map.png --rectify   # two hand-held photos
-  mrfgs match left.png right.png disparity.pfm --max-disparity 63
-  mrfgs match im0.png im1.png disparity.png   # range: calib.txt beside im0.png
-  mrfgs rectify left.png right.png rectified --calib stereo.yml
-  mrfgs batch pairs.csv maps                  # many pairs; again to resume
-  mrfgs sequence left right maps              # the frames of a video
-  mrfgs ros --method fast --also points       # live from two ROS 2 cameras
+  # Two hand-held photos; map.preview.png shows the map in colours:
+  mrfgs match a.jpg b.jpg map.pfm --rectify --also preview
+  # Try it on a built-in pair:
+  mrfgs demo
+  # Images of a calibrated rig, with depth:
+  mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
+  # Images that are rectified already:
+  mrfgs match left.png right.png d.pfm --max-disparity 63
+  # Many pairs; run it again to resume:
+  mrfgs batch pairs.csv maps
+  # The frames of a video:
+  mrfgs sequence left right maps
+  # Live from two ROS 2 cameras:
+  mrfgs ros --method fast --also points
+  # Compare with the truth:
   mrfgs evaluate Teddy Cones --json figures.json
-  mrfgs presets paper > paper.toml
 
 Exit status: 0 on success, 2 if the command line is wrong (also for this pair or this machine), 130 if \
 stopped by Ctrl-C or another signal, 1 for any other failure. A failure prints one line on standard error and leaves no output behind.";
@@ -200,8 +207,10 @@ mod tests {
             .map(str::to_owned)
             .collect();
         let of_help = lines.len();
-        for document in ["README.md", "docs/guide.md", "docs/results.md"] {
-            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(document);
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+        let pages = ["README.md", "docs/results.md", "docs/guide/*.md"].map(|name| format!("{root}/{name}"));
+        for path in pages.iter().flat_map(|pattern| glob::glob(pattern).unwrap()) {
+            let path = path.unwrap();
             let text = std::fs::read_to_string(path).unwrap();
             let prose = text.split("\n```").step_by(2).collect::<Vec<_>>().join("\n");
             let spans = prose.split('`').skip(1).step_by(2).map(|span| span.replace('\n', " "));

@@ -104,8 +104,8 @@ pub(crate) fn run(
             count => format!(", {count} tiles"),
         };
         console::say(&format!(
-            "{name}{width} x {height}, {labels} label{}{tiles}, {iterations} iteration{} in {:.2} s on {}",
-            plural(labels),
+            "{name}{width} x {height}, {labels} disparit{}{tiles}, {iterations} iteration{} in {:.2} s on {}",
+            if labels == 1 { "y" } else { "ies" },
             plural(iterations as usize),
             time.as_secs_f64(),
             matched.ran_on

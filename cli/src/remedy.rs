@@ -16,14 +16,14 @@ pub(crate) const FLAGS: Vocabulary = Vocabulary {
     threads: "--threads",
     memory: Some(["--memory", "MiB"]),
     steps: Some("DIR"),
-    mask: Some("--mask what is no image"),
+    mask: Some("mask what is not image with --mask"),
     max_pixels: Some("--max-pixels"),
-    truth_scale: Some("--scale (that of the truth: --truth-scale)"),
+    truth_scale: Some("--scale (for ground truth: --truth-scale)"),
     no_data: Some("--no-data"),
-    calibration: "a calibration by --calib",
+    calibration: "a calibration with --calib",
     orient: Some("--orient"),
-    rectify: Some("--rectify (or `mrfgs rectify`)"),
-    unit: Some("say the right one in the file by an entry `unit`: mm, cm or m"),
+    rectify: Some("add --rectify (and --calib FILE if you have a calibration)"),
+    unit: Some("give the right one in the file as an entry `unit`: mm, cm or m"),
     crop: Some("--calib-crop"),
     ..Vocabulary::PLAIN
 };
@@ -33,8 +33,12 @@ pub(crate) const NUMBERS: Vocabulary =
     Vocabulary { unit: Some("give the right one with the number, such as 120mm, 12cm or 0.12m"), ..FLAGS };
 
 /// Words for a list of pairs, where --rectify needs a calibration.
-pub(crate) const COLUMNS: Vocabulary =
-    Vocabulary { min: "min_disparity", max: "max_disparity", rectify: Some("`mrfgs rectify`"), ..FLAGS };
+pub(crate) const COLUMNS: Vocabulary = Vocabulary {
+    min: "min_disparity",
+    max: "max_disparity",
+    rectify: Some("rectify it first with `mrfgs rectify`"),
+    ..FLAGS
+};
 
 #[cfg(test)]
 mod tests {
@@ -97,21 +101,24 @@ mod tests {
             ),
             (far(9_999_999), "--max-disparity ... within 9 px"),
             (far(-9_999_999), "--min-disparity ... within 9"),
-            (labels(0, 20_000), "--max-disparity: 0 to 20000 are 20001 labels ... narrow the range"),
-            (labels(i32::MIN, i32::MAX), "4294967296 labels"),
+            (labels(0, 20_000), "--max-disparity: 0 to 20000 are 20001 disparities ... narrow the range"),
+            (labels(i32::MIN, i32::MAX), "4294967296 disparities"),
             (
                 RangeError::OutsideImages { min: 60, max: 70, width: 60 }.into(),
                 "--max-disparity ... give a range",
             ),
             (
                 RangeError::NotFound { cause: None }.into(),
-                "too few matches ... one scene, or give --max-disparity",
+                "too few matches ... same scene, or give --max-disparity",
             ),
             (
                 RangeError::NotRectified.into(),
-                "not rectified ... rectify the pair by --rectify ... or give --max-disparity",
+                "not rectified ... add --rectify ... --calib FILE ... or give --max-disparity",
             ),
-            (RangeError::NotFound { cause: Some("it is plain".into()) }.into(), "disparities: it is plain"),
+            (
+                RangeError::NotFound { cause: Some("it is plain".into()) }.into(),
+                "no range of disparities found: it is plain",
+            ),
             (no_device.into(), "--device ... 0: llvmpipe ... `mrfgs devices`"),
             (
                 ExecutionError::ThreadCount { wanted: 0, most: 9 }.into(),
@@ -119,7 +126,7 @@ mod tests {
             ),
             (ExecutionError::Threads("limit".into()).into(), "--threads ... limit"),
             (too_small.into(), "--memory: 1 MiB ... give at least 7MiB"),
-            (BudgetError::Steps { needed: 70 }.into(), "DIR: ... show its steps ... --memory 70MiB"),
+            (BudgetError::Steps { needed: 70 }.into(), "DIR: to show the steps ... --memory 70MiB"),
             (
                 read(ReadError::TooManyPixels { width: 9, height: 9, limit: 5 }),
                 "a.png ... raise --max-pixels",
@@ -136,16 +143,16 @@ mod tests {
             (Error::Calibration("does not say baseline".into()), "the calibration does not say baseline"),
             (
                 RectificationError::Few { agreeing: 3, matches: 9, least: 30 }.into(),
-                "its matches: 3 of 9 agree ... one scene ... --calib",
+                "without a calibration: only 3 of 9 matches agree ... same scene ... --calib",
             ),
             (RectificationError::Flat.into(), "no depth ... step to the side ... --calib"),
-            (RectificationError::Forward.into(), "away from it ... step to the side ... --calib"),
+            (RectificationError::Forward.into(), "instead of to the side ... step to the side ... --calib"),
             (Error::Mismatch("the sizes differ".into()), "the sizes differ"),
             (DeviceError::NoDriver.into(), "install the driver ... --device cpu"),
             (DeviceError::WrongMaps { name: name() }.into(), "update its driver ... --device cpu"),
-            (too_large.into(), "9000 labels ... --device cpu"),
+            (too_large.into(), "9000 disparities ... --device cpu"),
             (failed.into(), "another --device ... --device cpu"),
-            (machine(None, Purpose::Match).into(), "3.0 GiB ... by --memory"),
+            (machine(None, Purpose::Match).into(), "3.0 GiB ... a smaller --memory"),
             (machine(Some(1 << 20), Purpose::Match).into(), "1 MiB are free ... --set percentile"),
             (machine(None, Purpose::Image).into(), "3.0 GiB ... smaller image"),
             (on_device.into(), "2 MiB ... --device cpu ... smaller --memory"),
@@ -159,16 +166,16 @@ mod tests {
 
     /// Every warning, with the words that its message must contain in order.
     const WARNINGS: [(Warning, &str); 16] = [
-        (Warning::Oriented { which: 2 }, "both images ... turn them upright by --orient"),
+        (Warning::Oriented { which: 2 }, "both images ... turn them upright with --orient"),
         (Warning::Identical, "give the right view"),
         (Warning::Plain { view: "left" }, "the left view"),
         (Warning::Masked { view: "right" }, "the right view is masked"),
         (Warning::HardlyMatch { percent: 7 }, "only 7 % ... rectified"),
-        (Warning::LittleLeft { percent: 7, masked: 85 }, "only 7 % ... covers 85 % ... what is no image"),
+        (Warning::LittleLeft { percent: 7, masked: 85 }, "only 7 % ... covers 85 % ... not the scene"),
         (Warning::Contrast { percent: 12 }, "12 %"),
-        (Warning::Saturated { percent: [1, 37] }, ", or --mask"),
+        (Warning::Saturated { percent: [1, 37] }, ", or mask what is not image with --mask"),
         (Warning::Turned { how: "upside down" }, "upside down"),
-        (Warning::NotRectified { offset: 512 }, "2.0 px ... its own matches: use --rectify"),
+        (Warning::NotRectified { offset: 512 }, "2.0 px ... row: add --rectify (and --calib FILE"),
         (Warning::Copied { part: Part::Whole }, "the same pixels everywhere ... wrote the images"),
         (
             Warning::Blurred { view: "right", part: ROWS },

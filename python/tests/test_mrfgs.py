@@ -448,7 +448,7 @@ class Match(unittest.TestCase):
     def test_what_makes_no_sense_is_an_exception(self):
         left, right = pair()
         for error, words, call in (
-            (ValueError, "one size", lambda: mrfgs.match(left, right[:, 1:].copy(), 15)),
+            (ValueError, "the same size", lambda: mrfgs.match(left, right[:, 1:].copy(), 15)),
             (ValueError, "height, width", lambda: mrfgs.match(left[0, 0], right, 15)),
             (ValueError, "1 to 4 channels", lambda: mrfgs.match(np.dstack([left, left]), right, 15)),
             (ValueError, "has pixels", lambda: mrfgs.match(left[:0], right[:0], 15)),
@@ -597,7 +597,7 @@ class Match(unittest.TestCase):
             (ValueError, f"threads: give an integer from {most}, or None, not -1", lambda: mrfgs.Matcher(device="cpu", threads=-1)),
             (TypeError, f"threads: give an integer from {most}, or None, not '2'", lambda: mrfgs.match(left, right, 15, device="cpu", threads="2")),
             (TypeError, "threads: give an integer", lambda: mrfgs.Matcher(device="cpu", threads=1.5)),
-            (ValueError, f"threads: {2**63 - 1} threads cannot be had; give {most}", lambda: mrfgs.Matcher(device="cpu", threads=10**30)),
+            (ValueError, f"threads: {2**63 - 1} threads are not possible; give {most}", lambda: mrfgs.Matcher(device="cpu", threads=10**30)),
             (TypeError, "options: keys must be names of options, such as \"fill\" (see mrfgs.options()), not 3",
              lambda: matcher.match(left, right, 15, options={3: 4})),
             (TypeError, 'options["cost"]: keys must be names of options', lambda: matcher.match(left, right, 15, options={"cost": {None: 4}})),
@@ -1151,7 +1151,7 @@ class Rectification(Folder):
         swapped = text.replace("data: [ -0.16356857928250576", "data: [ 0.16356857928250576")
         self.assertNotEqual(swapped, text)
         for words, call in (
-            ("the right camera on the left of the left one, so each was taken", lambda: mrfgs.Rectification(of_texts(swapped))),
+            ("the right camera to the left of the left one, so the two were swapped", lambda: mrfgs.Rectification(of_texts(swapped))),
             ("those of 480 x 360 count as the same, scaled; .*crop=", lambda: mrfgs.Rectification(CAMERAS, (480, 360))),
             ("mm apart.*unit=", lambda: mrfgs.Rectification(of_texts(text, unit="mm"))),
             ("120 m apart.*Rig.of", lambda: mrfgs.Rig.of(700, 120, size=(640, 480), unit="m")),
@@ -1191,7 +1191,7 @@ class Rectification(Folder):
             (ValueError, "the text: R is missing", lambda: mrfgs.Rectification(of_texts(text.split("R: ")[0]), (240, 180))),
             (ValueError, "crop: the text: the calibration is for images of 240 x 180",
              lambda: of_texts(text, crop=(0, 1, 240, 180))),
-            (ValueError, "cameras.yml: the calibration is for images of 240 x 180 and these are 180 x 240; size is (width, height)",
+            (ValueError, "cameras.yml: the calibration is for images of 240 x 180, but these are 180 x 240; size is (width, height)",
              lambda: mrfgs.Rectification(CAMERAS, (180, 240))),
             (ValueError, "size: the text lacks the size of the images; give (width, height)", lambda: mrfgs.Rectification(sizeless)),
             (ValueError, "size: give (width, height), both above 0", lambda: mrfgs.Rectification(sizeless, (0, 180))),
@@ -1201,13 +1201,13 @@ class Rectification(Folder):
             (TypeError, "size: give (width, height), two integers", lambda: mrfgs.Rectification(sizeless, (240.5, 180))),
             (ValueError, "alpha: give a number from 0 to 1, not 1.5", lambda: mrfgs.Rectification(CAMERAS, alpha=1.5)),
             (ValueError, "alpha", lambda: mrfgs.Rectification(CAMERAS, alpha=float("nan"))),
-            (ValueError, "240 x 180 and these are 239 x 180", lambda: by.apply(left[:, 1:], right[:, 1:])),
-            (ValueError, "240 x 180 and these are 239 x 180", lambda: by.apply(left, right[:, 1:])),
+            (ValueError, "240 x 180 but these are 239 x 180", lambda: by.apply(left[:, 1:], right[:, 1:])),
+            (ValueError, "240 x 180 but these are 239 x 180", lambda: by.apply(left, right[:, 1:])),
             (TypeError, "left: give an array of integers", lambda: by.apply(left > 9, right)),
             (TypeError, "right", lambda: by.apply(left, "right.png")),
             (ValueError, "mask", lambda: by.apply(left, right, mask=np.zeros((3, 3), bool))),
             (ValueError, "cameras.yml: describes images that are not rectified; use Rectification(...).rig", lambda: mrfgs.Rig(CAMERAS)),
-            (ValueError, "the text: the calibration does not say cam0 and doffs and baseline", lambda: mrfgs.Rig(of_texts("ndisp=64\n"))),
+            (ValueError, "the text: the calibration lacks cam0 and doffs and baseline", lambda: mrfgs.Rig(of_texts("ndisp=64\n"))),
             (ValueError, "baseline=0 is not above 0", lambda: mrfgs.Rig(of_texts("cam0=[9 0 2; 0 9 2; 0 0 1]\ndoffs=0\nbaseline=0\n"))),
         ):
             with self.subTest(words):
@@ -1573,7 +1573,7 @@ class Sequences(Folder):
                 self.assertTrue(np.array_equal(other.rotations, corrected.rotations))
                 self.assertEqual(other.cameras_yml(), corrected.cameras_yml())
         self.assertFalse(np.array_equal(by.rotations[1], twice.rotations[1]))
-        self.refused(ValueError, "240 x 180 pixels and these images 240 x 179", lambda: drift.follow(left[1:], right[1:], 31))
+        self.refused(ValueError, "240 x 180 pixels, but these images have 240 x 179", lambda: drift.follow(left[1:], right[1:], 31))
         self.refused(ValueError, "disparit", lambda: drift.follow(left, right, -1))
         self.refused(TypeError, "max_disparity", lambda: drift.follow(left, right, None))
         self.refused(TypeError, "max_disparity", lambda: drift.follow(left, right))
@@ -1635,7 +1635,7 @@ class Sequences(Folder):
             self.refused(error, words, go)
             self.assertEqual(len(found), 1)
         # Errors of the match itself.
-        self.refused(ValueError, "pair 0: the views have too few matches", lambda: list(self.matcher.match_all([(left * 0, right * 0)])))
+        self.refused(ValueError, "pair 0: no range of disparities found", lambda: list(self.matcher.match_all([(left * 0, right * 0)])))
         self.refused(ValueError, "pair 0: memory: 1 MiB", lambda: list(self.matcher.match_all([(left, right)], 15, options={"memory": 1})))
         # Errors before any pair is read.
         taken = iter([(left, right)])

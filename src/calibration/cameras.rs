@@ -145,7 +145,7 @@ impl RectifiedViews {
     pub fn calibration(&self, size: Option<(usize, usize)>, unit: Unit) -> Result<Calibration> {
         let error = |reason: &str| Err(Error::Calibration(reason.into()));
         if self.is_vertical() {
-            return error("has one camera above the other, and only rows are matched");
+            return error("has one camera above the other, but only rows are matched");
         }
         if self.is_exchanged() {
             return Ok(Calibration { exchanged: true, ..self.exchanged().calibration(size, unit)? });
@@ -199,7 +199,10 @@ impl StereoCalibration {
         let (width, height) = part.size();
         let error = |reason: String| Err(Error::Calibration(reason));
         if !self.others.is_empty() {
-            return error(format!("is for images of {}, and a part takes one size", self.shown_sizes()));
+            return error(format!(
+                "is for images of {}, but a part needs cameras of the same size",
+                self.shown_sizes()
+            ));
         }
         let outside = |(w, h): &(usize, usize)| part.x.end > *w || part.y.end > *h;
         if width.min(height) == 0 || self.sizes().into_iter().flatten().any(|size| outside(&size)) {
@@ -231,7 +234,7 @@ impl StereoCalibration {
         let [left, right] = sizes.map(shown);
         let these = if left == right { left } else { format!("{left} and {right}") };
         Err(Error::Mismatch(format!(
-            "the calibration is for images of {} and these are {these}",
+            "the calibration is for images of {}, but these are {these}",
             self.shown_sizes()
         )))
     }
@@ -306,7 +309,7 @@ impl StereoCalibration {
             return Ok(fitting.pop());
         }
         let sizes = self.shown_sizes();
-        let of = size.map_or("; say which".into(), |size| format!(", and these are {}", shown(size)));
+        let of = size.map_or("; say which".into(), |size| format!(", but these are {}", shown(size)));
         Err(Error::Calibration(format!("is for images of {sizes}{of}")))
     }
 

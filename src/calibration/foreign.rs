@@ -166,7 +166,7 @@ pub(super) fn of_bytes(bytes: &[u8]) -> Option<String> {
         bytes.get(*offset..).is_some_and(|bytes| bytes.starts_with(magic))
     };
     if let Some((.., what)) = KINDS.iter().find(begins) {
-        return Some(format!("is {what}, and no calibration"));
+        return Some(format!("is {what}, not a calibration"));
     }
     KINDS_WITH_REMEDY.iter().find(begins).map(|(.., what)| (*what).to_owned())
 }
@@ -180,7 +180,7 @@ pub(super) fn of_text(text: &str) -> Option<String> {
         .chars()
         .any(|c| c.is_control() && !matches!(c, '\t' | '\n' | '\r' | '\u{c}' | '\u{1a}' | '\u{85}'))
     {
-        return Some("holds bytes that are no text, so it is no calibration that is known here".into());
+        return Some("holds bytes that are not text, so it is not a calibration of a known form".into());
     }
     if let Some(name) = member_of_dso(text) {
         return Some(format!("is the camera of {name}, which is one; {OPENCV}"));

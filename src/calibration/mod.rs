@@ -256,7 +256,7 @@ fn unpacked(path: &Path, bytes: Vec<u8>) -> Result<Vec<u8>> {
     let read = GzDecoder::new(&bytes[..]).take(MAX_BYTES + 1).read_to_end(&mut unpacked);
     match read {
         Ok(count) if count as u64 <= MAX_BYTES => Ok(unpacked),
-        Ok(_) => Err(Error::read(path, "unpacked, is larger than any calibration file; is it one?")),
+        Ok(_) => Err(Error::read(path, "is larger, once unpacked, than any calibration file; is it one?")),
         Err(_) => Err(Error::read(path, "is damaged gzip, or a part of it is missing; copy it again")),
     }
 }
@@ -275,7 +275,7 @@ fn root(path: &Path, text: &str) -> Result<Node> {
     let text = text.trim_start_matches('\u{feff}').trim_start();
     let wrong = |reason: String| Error::read(path, reason);
     if text.is_empty() {
-        return Err(wrong("is empty; it is to be a calibration".into()));
+        return Err(wrong("is empty; give a calibration".into()));
     }
     if let Some(node) = colmap::parse(text) {
         return Ok(node);

@@ -188,7 +188,9 @@ pub(super) fn percent(part: f64, whole: f64) -> Option<f64> {
 }
 
 pub(super) fn nothing_known() -> Error {
-    Error::Mismatch("the ground truth holds no known (finite) pixel: nothing to compare with".into())
+    Error::Mismatch(
+        "the ground truth holds no known (finite) pixel, so there is nothing to compare with".into(),
+    )
 }
 
 /// `value` rounded to four decimals, through its exact decimal expansion (ties to even).

@@ -148,7 +148,7 @@ impl Drift {
         if pair.size() != self.size {
             let ((width, height), (w, h)) = (self.size, pair.size());
             return Err(Error::Mismatch(format!(
-                "the rectified views have {width} x {height} pixels and these images {w} x {h}"
+                "the rectified views have {width} x {height} pixels, but these images have {w} x {h}"
             )));
         }
         self.count += 1;

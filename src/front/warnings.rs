@@ -60,7 +60,7 @@ pub enum Warning {
     },
     /// The files tag their images as rotated, and they were not turned upright.
     #[error(
-        "{} stored turned, by the orientation tag of EXIF or TIFF, and taken as stored",
+        "{} stored turned, as the EXIF or TIFF tag for orientation says, and used as stored",
         ["the left image is", "the right image is", "both images are"][*which]
     )]
     Oriented {
@@ -87,8 +87,8 @@ pub enum Warning {
     },
     /// Both views have the same pixels in a part.
     #[error(
-        "both views hold the same pixels {part}, so a part of one has got into the other, and shows no depth there: check what wrote \
-         the images"
+        "both views hold the same pixels {part}, so there is no depth there: a part of one view was copied into the other; check the \
+         program that wrote the images"
     )]
     Copied {
         /// The part.
@@ -96,8 +96,8 @@ pub enum Warning {
     },
     /// A view lacks the detail of the other one.
     #[error(
-        "the {view} view lacks the detail of the other {part}, so little can be matched there: check that it is in focus and that \
-         nothing covers the camera, and that the other one shows the scene and no noise"
+        "the {view} view has far less detail than the other {part}, so little can be matched there: check that it is in focus, that \
+         nothing covers the camera, and that the detail of the other view is not just noise"
     )]
     Blurred {
         /// Name of the view: "left" or "right".
@@ -107,8 +107,8 @@ pub enum Warning {
     },
     /// Almost nothing of some rows was found, unlike the other rows.
     #[error(
-        "next to nothing {part} of the left view is on the same rows of the right one, other than elsewhere: check that no view is torn, \
-         and that both show one moment there"
+        "hardly anything {part} of the left view is found on the same rows of the right one, unlike elsewhere: check that no image is \
+         torn there, and that both were taken at the same moment"
     )]
     Torn {
         /// The rows.
@@ -116,7 +116,7 @@ pub enum Warning {
     },
     /// One view has far less contrast than the other.
     #[error(
-        "the exposures are far apart: one view has {percent} % of the other's contrast: expose both alike, or give them \
+        "the exposures are far apart: one view has {percent} % of the other's contrast: expose both alike, or give images \
          with 16 bits"
     )]
     Contrast {
@@ -136,8 +136,7 @@ pub enum Warning {
     },
     /// One view is turned or mirrored relative to the other.
     #[error(
-        "one of the views is {how}, because the other one matches it only that way: turn it back, so that both views have \
-         the same orientation"
+        "one of the views is {how} compared with the other: turn it back, so that both views have the same orientation"
     )]
     Turned {
         /// How: "upside down", "mirrored", "turned by half a turn" or "turned by a quarter".
@@ -145,14 +144,13 @@ pub enum Warning {
     },
     /// Matches lie on the same column.
     #[error(
-        "matches lie on the same column, not on the same row, because both images are turned by 90 degrees, or one camera \
-         was above the other: turn both images by 90 degrees"
+        "matches lie on the same column instead of the same row: both images are turned by 90 degrees, or one camera was \
+         above the other; turn both images by 90 degrees"
     )]
     Sideways,
     /// Matches do not lie on the same row.
     #[error(
-        "the pair is not rectified: matches lie {:.1} px above or below their row: rectify it first, by the calibration \
-         of the cameras or by its own matches",
+        "the pair is not rectified: matches lie {:.1} px above or below their row",
         f64::from(*offset) / f64::from(FRACTION)
     )]
     NotRectified {
@@ -167,8 +165,8 @@ pub enum Warning {
     },
     /// Few pixels of the left view were found in the right one.
     #[error(
-        "only {percent} % of the pixels were found in both views, and all others are guessed from these: check that the views \
-         show one scene at one moment, are rectified, and that neither is turned or inverted"
+        "only {percent} % of the pixels were found in both views, and all others are guessed from these: check that both show \
+         the same scene at the same moment, that they are rectified, and that neither is turned or a negative"
     )]
     HardlyMatch {
         /// Pixels that were found, in percent of those that are not masked.
@@ -177,7 +175,7 @@ pub enum Warning {
     /// Few of the pixels outside a large mask were found in the right view.
     #[error(
         "only {percent} % of the pixels that the mask leaves were found in both views; it covers {masked} % of the left view: check that \
-         it covers what is no image, and leaves what both views show in one piece"
+         it covers what is to be ignored, and not the scene"
     )]
     LittleLeft {
         /// Pixels that were found, in percent of those that are not masked.

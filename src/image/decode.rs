@@ -98,10 +98,10 @@ const FOREIGN: [(usize, &[u8], &str, &str); 35] = [
     (0, b"\x89MCAP0", "a recording of ROS", FILM),
     (0, b"#ROSBAG", "a recording of ROS", FILM),
 ];
-const PICTURE: &str = "convert it to PNG";
-const FLOATS: &str = "convert it to PFM or to TIFF with floats";
+const PICTURE: &str = "convert it to PNG or JPEG";
+const FLOATS: &str = "convert it to PFM, or to TIFF with floats";
 const RAW: &str = "develop both views alike, to TIFF or PNG with 16 bits, without a correction of the lens";
-const FILM: &str = "its frames are pairs of a sequence, not an image";
+const FILM: &str = "it is a sequence of frames, not one image";
 
 /// The message for a file of an unknown kind.
 fn unknown(bytes: &[u8]) -> String {
@@ -109,7 +109,7 @@ fn unknown(bytes: &[u8]) -> String {
         bytes.get(*at..).is_some_and(|rest| rest.starts_with(magic))
     };
     match FOREIGN.iter().find(begins) {
-        Some((_, _, what, remedy)) => format!("is {what}, which is not read here: {remedy}"),
+        Some((_, _, what, remedy)) => format!("is {what}, which is not supported: {remedy}"),
         None => "not an image of a known format; give PNG, JPEG, PNM, TIFF, BMP, PFM or NPY".into(),
     }
 }
@@ -267,11 +267,11 @@ mod tests {
         for (at, magic, what, remedy) in FOREIGN {
             let bytes = [&vec![0; at][..], magic, &[0; 64]].concat();
             assert_eq!(Kind::detect(&bytes), None, "{what}");
-            assert_eq!(unknown(&bytes), format!("is {what}, which is not read here: {remedy}"));
+            assert_eq!(unknown(&bytes), format!("is {what}, which is not supported: {remedy}"));
         }
         assert!(
             unknown(b"RIFF\0\0\0\0WEBPVP8 ")
-                .contains("is a WebP image, which is not read here: convert it to PNG")
+                .contains("is a WebP image, which is not supported: convert it to PNG")
         );
         assert!(unknown(b"hello").contains("known format; give PNG"));
     }

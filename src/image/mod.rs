@@ -382,7 +382,7 @@ impl Pair {
         let (l, r) = (left.pixels.size(), right.pixels.size());
         if l != r {
             return Err(Error::Mismatch(format!(
-                "the left image is {} x {} and the right one {} x {}: both views of a rectified pair have one size",
+                "the left image is {} x {} and the right one {} x {}: both images must have the same size",
                 l.0, l.1, r.0, r.1
             )));
         }

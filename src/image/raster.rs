@@ -174,7 +174,9 @@ impl<'a> Raster<'a> {
     pub fn masked_by(self, ignored: Plane<bool>) -> Result<Self> {
         if ignored.size() != self.size() {
             let ((w, h), (width, height)) = (ignored.size(), self.size());
-            return Err(Error::Mismatch(format!("the mask is {w} x {h} and its image {width} x {height}")));
+            return Err(Error::Mismatch(format!(
+                "the mask is {w} x {h}, but its image is {width} x {height}"
+            )));
         }
         Ok(self.ignoring(ignored.into_data()))
     }
@@ -336,14 +338,14 @@ pub(super) fn joined(
     let ((width, height), (w, h)) = (left.size(), right.size());
     if (width, height) != (w, h) && sizes == Sizes::Equal {
         return Err(Error::Mismatch(format!(
-            "{of_left} is {width} x {height} and {of_right} is {w} x {h}: both views of a rectified pair have one size"
+            "{of_left} is {width} x {height} and {of_right} is {w} x {h}: both images must have the same size"
         )));
     }
     let float = images.map(|image| image.samples.is_float());
     if float[0] != float[1] {
         let [float, whole] = if float[0] { [&of_left, &of_right] } else { [&of_right, &of_left] };
         return Err(Error::Mismatch(format!(
-            "{float} holds float values and {whole} whole ones: give both in one format"
+            "{float} holds floats, but {whole} holds whole numbers: give both in the same format"
         )));
     }
     // Pixels and masks of both views.

@@ -121,7 +121,7 @@ impl Reader {
         let ((w, h), (width, height)) = (ignored.size(), image.size());
         image.masked_by(ignored).map_err(|_| {
             Error::Mismatch(format!(
-                "the mask {} is {w} x {h} and {} is {width} x {height}: a mask has the size of the left image",
+                "the mask {} is {w} x {h} but {} is {width} x {height}: a mask must have the size of the left image",
                 path.display(),
                 file.display()
             ))

@@ -46,7 +46,7 @@ fn destination(path: &Path) -> Result<Option<(PathBuf, PathBuf)>> {
 #[must_use]
 pub fn no_folder(folder: &Path) -> Reason {
     match folder.ancestors().find(|part| part.exists() && !part.is_dir()) {
-        Some(file) => format!("{} is a file and no folder; give another name", file.display()).into(),
+        Some(file) => format!("{} is a file, not a folder; give another name", file.display()).into(),
         None => format!("there is no folder {}; create it first", folder.display()).into(),
     }
 }

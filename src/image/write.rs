@@ -102,7 +102,7 @@ impl Plane<f32> {
 pub fn check_disparity_path(path: &Path, min_disparity: i32, max_disparity: i32) -> Result<()> {
     if format(path)? == Format::Png && (min_disparity < 0 || max_disparity > 255) {
         let reason = format!(
-            "16-bit PNG holds disparities from 0 to 255 and the range is {min_disparity} to {max_disparity}; \
+            "16-bit PNG holds disparities from 0 to 255, but the range is {min_disparity} to {max_disparity}; \
              write .pfm or .tif"
         );
         return Err(Error::write(path, Reason::of_request(reason)));
@@ -191,7 +191,7 @@ fn png_levels(map: &Plane<f32>) -> std::result::Result<Vec<u16>, String> {
             Ok(0)
         } else if d < 0.0 || level > u16::MAX as f32 {
             Err(format!(
-                "16-bit PNG holds disparities from 0 to below 256 and one is {d}; write .pfm or .tif"
+                "16-bit PNG holds disparities from 0 to below 256, but one is {d}; write .pfm or .tif"
             ))
         } else {
             Ok((level as u16).max(1))

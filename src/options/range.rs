@@ -107,10 +107,10 @@ mod tests {
         assert_eq!(DisparityRange::new(-3, -3).unwrap().labels(), 1);
         for (min, max, words) in [
             (5, 4, ["4 is", "below the minimum disparity 5"]),
-            (0, 2_000_000, ["2000000", "out of reach"]),
-            (-2_000_000, 0, ["-2000000", "out of reach"]),
-            (i32::MIN, i32::MAX, ["disparity", "out of reach"]),
-            (0, 16_384, ["16385 labels", "at most 16384 fit"]),
+            (0, 2_000_000, ["2000000", "too far from 0"]),
+            (-2_000_000, 0, ["-2000000", "too far from 0"]),
+            (i32::MIN, i32::MAX, ["disparity", "too far from 0"]),
+            (0, 16_384, ["16385 disparities", "at most 16384 can be searched"]),
         ] {
             let error = DisparityRange::new(min, max).unwrap_err().to_string();
             assert!(words.iter().all(|w| error.contains(w)), "{error}");

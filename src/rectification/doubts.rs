@@ -18,8 +18,8 @@ pub enum Doubt {
     },
     /// The calibration has the right camera to the left of the left one.
     #[error(
-        "has the right camera on the left of the left one, so each was taken for the other{}",
-        if *images { ", and by their matches the right image for the left one: maps are of that" } else { "" }
+        "has the right camera to the left of the left one, so the two were swapped{}",
+        if *images { ", and so were the images, by their matches: the maps belong to the second image" } else { "" }
     )]
     Exchanged {
         /// Whether the images were exchanged too.
@@ -27,7 +27,7 @@ pub enum Doubt {
     },
     /// An implausible distance of the cameras.
     #[error(
-        "has its cameras {} {} apart, and those of stereo cameras are 1 mm to 20 m apart, so the unit may be another one",
+        "has its cameras {} {} apart, but those of stereo cameras are 1 mm to 20 m apart, so the unit may be wrong",
         digits(*baseline), unit.name()
     )]
     Baseline {
@@ -38,7 +38,7 @@ pub enum Doubt {
     },
     /// An implausible focal length for a rectified pair.
     #[error(
-        "has a focal length of {} px, with which images {width} px wide show nearly half of the world, so it may be in millimetres",
+        "has a focal length of {} px, which is so short for images {width} px wide that it may be in millimetres",
         digits(*focal_length)
     )]
     FocalLength {
@@ -88,7 +88,7 @@ pub enum Doubt {
     },
     /// The rows of the matches that replace a calibration remain apart.
     #[error(
-        "rows are up to {pixels:.1} px apart: the lens may bend lines, or both images were not taken with one zoom: calibrate the \
+        "rows are up to {pixels:.1} px apart: the lens may bend lines, or the images were taken with different zooms: calibrate the \
          cameras for better maps"
     )]
     RowsApart {
@@ -97,7 +97,7 @@ pub enum Doubt {
     },
     /// The matches that replace a calibration cover a small part of the image.
     #[error(
-        "the matches are in {percent} % of the image, and elsewhere rows may be apart: check that the images overlap"
+        "the matches cover only {percent} % of the image, and elsewhere rows may not line up: check that the images overlap"
     )]
     Coverage {
         /// Parts of the image with matches, in percent of all.
@@ -105,7 +105,7 @@ pub enum Doubt {
     },
     /// Nearly all matches that replace a calibration fit one plane.
     #[error(
-        "all but {percent} % of the matches lie on one flat surface, which says little of how the camera moved: show things at \
+        "all but {percent} % of the matches lie on one flat surface, which says little about how the camera moved: show things at \
          different distances"
     )]
     NearlyFlat {

@@ -101,7 +101,7 @@ impl Rectification {
         let error = |reason: &str| Error::Calibration(reason.into());
         let lenses = calibration
             .lenses
-            .ok_or_else(|| error("does not say the lenses, K1, D1, K2 and D2, which rectification takes"))?;
+            .ok_or_else(|| error("lacks the lenses (K1, D1, K2 and D2), which rectification needs"))?;
         let views = match (calibration.views, &calibration.pose) {
             (Some(views), pose) if options.alpha.is_none() => {
                 pose.as_ref().map_or(Ok(()), |pose| views.check(pose))?;
@@ -115,7 +115,9 @@ impl Rectification {
                 }
                 views::choose(&[left_lens, right_lens], pose, size, options)?
             }
-            _ => return Err(error("does not say how the cameras stand to each other, R and T")),
+            _ => {
+                return Err(error("lacks the pose of the right camera (R and T), which rectification needs"));
+            }
         };
         let mut doubts: Vec<_> = fits.into_iter().flatten().map(|fit| Doubt::OtherSize { fit }).collect();
         doubts.dedup();
@@ -188,7 +190,7 @@ impl Rectification {
             let share = shown as f64 / (STEPS * STEPS) as f64;
             if share < LEAST {
                 return Err(Error::Calibration(format!(
-                    "leads to a {name} view of which {:.1} % shows the image, as of cameras that look past each other; check its \
+                    "leads to a {name} view of which only {:.1} % shows the image, as if the cameras looked past each other; check its \
                      rotations, its projections and that it is of these cameras",
                     100.0 * share
                 )));
@@ -284,7 +286,7 @@ impl Rectification {
         if let Some(i) = (0..2).find(|i| sizes[*i] != self.images[*i]) {
             let [(width, height), (w, h)] = [self.images[i], sizes[i]];
             return Err(Error::Mismatch(format!(
-                "the rectification is of images of {width} x {height} and these are {w} x {h}"
+                "the rectification is of images of {width} x {height} but these are {w} x {h}"
             )));
         }
         let bytes = images.iter().all(|image| image.holds_bytes());

@@ -22,7 +22,7 @@ impl Options {
     pub(super) fn check(&self) -> Result<()> {
         match self.alpha {
             Some(alpha) if !(0.0..=1.0).contains(&alpha) => Err(Error::Calibration(format!(
-                "is rectified with an alpha of 0 to 1, and {alpha} is outside"
+                "can be rectified with an alpha from 0 to 1, not with {alpha}"
             ))),
             _ => Ok(()),
         }

@@ -66,7 +66,7 @@ pub(super) fn choose(
     };
     if !cameras.iter().all(sound) {
         return error(
-            "leads to rectified views that show next to nothing; check its lenses, its rotation and its size",
+            "leads to rectified views that show hardly anything; check its lenses, its rotation and its size",
         );
     }
     let mut translation = [0.0; 2];

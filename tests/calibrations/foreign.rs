@@ -20,7 +20,7 @@ fn file(name: &str, bytes: impl AsRef<[u8]>, words: &'static str) -> File {
 }
 
 const NONE: &str = "is no calibration of a known form & expected the entries of OpenCV";
-const BYTES: &str = "bytes that are no text";
+const BYTES: &str = "bytes that are not text";
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut writer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
@@ -39,7 +39,7 @@ fn at(offset: usize, magic: &[u8]) -> Vec<u8> {
 /// Binary files: the offset of the signature, the signature, and the expected words.
 fn binaries() -> Vec<File> {
     let kinds: &[(&str, usize, &[u8], &str)] = &[
-        ("a.png", 0, b"\x89PNG\r\n\x1a\n", "a PNG image & no calibration"),
+        ("a.png", 0, b"\x89PNG\r\n\x1a\n", "a PNG image & not a calibration"),
         ("calib.txt", 0, b"\x89PNG\r\n\x1a\nwidth=3\n", "a PNG image"),
         ("a.jpg", 0, b"\xff\xd8\xff\xe0", "a JPEG image"),
         ("pair.mpo", 0, b"\xff\xd8\xff\xe1", "a JPEG image"),

@@ -136,7 +136,7 @@ describe('remedies', () => {
         assert.equal(await visit.changed(() => visit.give('dropped', [one, other].map((path, i) => ({ name: `im${i}.png`, path })))), 'ready');
         await visit.says('#no-range', /by hand/);
         assert.equal(await visit.changed(() => visit.tab.click('#rectify')), 'ready');
-        await visit.says('#pair-problem', /cannot be rectified by its matches/);
+        await visit.says('#pair-problem', /cannot be rectified without a calibration/);
         assert.equal(await visit.tab.$eval('#no-range', (offer) => offer.checkVisibility()), false);
         await visit.match({ range: [0, 31] });
         const offered = () => visit.tab.$$eval('#warnings button, #notes button', (buttons) => buttons.map((button) => button.textContent));

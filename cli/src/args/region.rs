@@ -6,8 +6,8 @@ use serde::{Serialize, Serializer};
 /// The region to match.
 #[derive(clap::Args)]
 pub(crate) struct RegionArgs {
-    /// Matches only this region of LEFT: first column, first row, width and height in pixels. All outputs cover that region, and the time
-    /// falls with it
+    /// Matches only this region of LEFT: first column, first row, width and height in pixels. All outputs cover that region, and a
+    /// smaller region takes less time
     #[arg(long, value_name = "X,Y,W,H", value_parser = region)]
     pub(crate) roi: Option<Rect>,
 }

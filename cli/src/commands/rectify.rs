@@ -30,7 +30,7 @@ Examples:
 /// pixel has no source), mask0.png and mask1.png (white there), and with --calib the calibration of the rectified pair as calib.txt
 /// (Middlebury) and cameras.yml (OpenCV).
 ///
-/// Without --calib the pair is rectified from its own matches, as for two photos taken side by side with one camera. A line tells how
+/// Without --calib the pair is rectified by points that match in both images, as for two hand-held photos of one camera. A line tells how
 /// reliable that is. There is no scale then, and no depth. Images are rotated upright by their EXIF orientation, but not with --calib, as a
 /// calibration applies to pixels as stored.
 ///

@@ -104,7 +104,7 @@ pub(super) static ALL: &[Also] = &[
     row("points-original.laz", "", Kind::Points(PointFrame::Original)),
     row(
         "confidence",
-        "How sure each pixel is: 8-bit .png, 0 to 255. The lead of the best disparity over the runner-up in 1/8 nat, averaged over neighbouring pixels",
+        "How sure each pixel is: 8-bit .png, from 0 (guessed) to 255 (sure). How much worse the second-best disparity fits (in 1/8 nat), averaged over neighbouring pixels",
         Kind::Bytes(|maps| &maps.confidence),
     ),
     row(

@@ -51,7 +51,7 @@ pub(super) fn left_out(limits: Limits, outcome: &Outcome, points: bool) -> Optio
     }
     let sure = outcome.final_map(limits);
     if !has_depths(&sure) {
-        return Some("--min-confidence leaves nothing of depths and points: lower it".into());
+        return Some("--min-confidence leaves no depths and no points: lower it".into());
     }
     let depths = rig.depths(&sure);
     if !has_depths(&limits.near(sure, rig)) {
@@ -64,7 +64,7 @@ pub(super) fn left_out(limits: Limits, outcome: &Outcome, points: bool) -> Optio
     let is_seen = |d: i32| rig.depth(f64::from(d) / f64::from(FRACTION)).is_some();
     let mut pixels = trusted.disparity.data().iter().zip(trusted.validity.data());
     (points && !pixels.any(|(d, flags)| *flags == 0 && is_seen(*d))).then(|| {
-        "points leave out what is filled or of low confidence, and nothing else is left: check that both images show one scene, and the range"
+        "points leave out filled pixels and those of low confidence, and there are no others: check that both images show the same scene, and check the range"
             .into()
     })
 }

@@ -300,7 +300,7 @@ impl Input {
         if self.by_matches {
             let DisparityRange { min, max } = sign.range(self.range);
             console::say(&format!(
-                "disparities {min} to {max}, by sparse matches{place}; set them with --max-disparity"
+                "disparities {min} to {max}, estimated from the images{place}; set them with --max-disparity"
             ));
         }
     }
@@ -315,7 +315,7 @@ impl Input {
         if matched.range() != self.range {
             let DisparityRange { min, max } = sign.range(matched.range());
             console::say(&format!(
-                "disparities {min} to {max} in a second match, because the scene{place} goes beyond the sparse matches"
+                "disparities {min} to {max} in a second match, because the scene{place} goes beyond the estimate"
             ));
         }
     }

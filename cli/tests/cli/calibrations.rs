@@ -262,7 +262,7 @@ const WRONG: &[Row] = &[
     ),
     ("chain", "T_cn_cnm1", "T_other", "cam1.T_cn_cnm1 is missing & 4 x 4"),
     ("chain", "[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.0, 0.0, 2.0]", "cam1.T_cn_cnm1: expected a rotation"),
-    ("chain", "[240, 180]", "[320, 200]", "is for images of 320 x 200, 240 x 180 and these are 240 x 180"),
+    ("chain", "[240, 180]", "[320, 200]", "is for images of 320 x 200, 240 x 180, but these are 240 x 180"),
     ("chain", "intrinsics: [214.0, ", "intrinsics: [", "cam0.intrinsics: expected 4 numbers & 3 numbers"),
     ("chain", "intrinsics: [214.0, ", "intrinsics: [0, ", "cam0.intrinsics: expected 4 numbers & above 0"),
     ("ros", "plumb_bob", "thin_prism", "distortion_model: expected plumb_bob & `thin_prism`"),
@@ -271,7 +271,7 @@ const WRONG: &[Row] = &[
         "ros",
         "image_width: 240",
         "image_width: 200",
-        "is for images of 240 x 180, 200 x 180 and these are 240 x 180",
+        "is for images of 240 x 180, 200 x 180, but these are 240 x 180",
     ),
     ("ros", "-34.48", "0", "projection_matrix: expected focal length times baseline"),
     ("ros", "215.5, 0, 118.5, -34", "100.5, 0, 118.5, -34", "projection_matrix: expected the focal length"),
@@ -318,14 +318,13 @@ fn swapped_cameras_are_exchanged() {
     fs::write(folder.join("exchanged.yml"), exchanged.opencv("")).unwrap();
     run(&folder, "rectify @raw/left.png @raw/right.png expected --calib rig.yml --quiet").succeeded();
     // Images in the order of the cameras' positions, and in the order of the file.
-    let told =
-        "exchanged.yml: has the right camera on the left of the left one, so each was taken for the other";
+    let told = "exchanged.yml: has the right camera to the left of the left one, so the two were swapped";
     for (images, out, words) in [
         ("@raw/left.png @raw/right.png", "a", told.to_owned()),
         (
             "@raw/right.png @raw/left.png",
             "b",
-            format!("{told}, and by their matches the right image for the left one"),
+            format!("{told}, and so were the images, by their matches: the maps belong to the second image"),
         ),
     ] {
         run(&folder, &format!("rectify {images} {out} --calib exchanged.yml")).succeeded().says(&words);
@@ -348,8 +347,8 @@ fn images_of_another_size_are_reported() {
         fs::write(folder.join(name), text.replacen("[ 240, 180 ]", size, 1)).unwrap();
     }
     let images = "rectify @raw/left.png @raw/right.png";
-    let words = "half.yml: is for images of 120 x 90: those of 240 x 180 count as the same, scaled; if they show another part, say \
-                 which by --calib-crop";
+    let words = "half.yml: is for images of 120 x 90: those of 240 x 180 count as the same, scaled; if they show another part, give \
+                 it with --calib-crop";
     run(&folder, &format!("{images} half --calib half.yml")).succeeded().says(words);
     run(&folder, &format!("{images} fits --calib fits.yml")).succeeded().is_silent_on("is for images of");
     run(&folder, &format!("{images} odd --calib odd.yml"))
@@ -367,7 +366,7 @@ fn images_of_another_size_are_reported() {
         .says("480 x 360 count as the same, scaled");
     assert!(differing(&folder, "two/im0.png", "fits/im0.png") == 0.0);
     assert!(differing(&folder, "two/mask1.png", "fits/mask1.png") < 0.05, "the right view shows as much");
-    run(&folder, "rectify @raw/left.png right.png alone").failed(1, "right.png is 480 x 360 & one size");
+    run(&folder, "rectify @raw/left.png right.png alone").failed(1, "right.png is 480 x 360 & the same size");
     // So are both views in one file.
     let jpegs = [scene("raw/left.png"), folder.join("right.png")].map(|view| {
         let mut file = std::io::Cursor::new(Vec::new());
@@ -386,8 +385,10 @@ fn images_of_another_size_are_reported() {
     alike(&folder.join("files"), &folder.join("one"), "both views in one file");
     let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
     assert!(bytes("files-d.pfm") == bytes("one-d.pfm"));
-    run(&folder, "rectify both.mpo alone").failed(1, "the right view in both.mpo is 480 x 360 & one size");
-    run(&folder, "match both.mpo d.pfm --max-disparity 31").failed(1, "both.mpo is 480 x 360 & one size");
+    run(&folder, "rectify both.mpo alone")
+        .failed(1, "the right view in both.mpo is 480 x 360 & the same size");
+    run(&folder, "match both.mpo d.pfm --max-disparity 31")
+        .failed(1, "both.mpo is 480 x 360 & the same size");
 }
 
 /// An MPO file of two JPEG files.
@@ -424,7 +425,7 @@ fn an_implausible_unit_is_reported() {
         let line = "match @slanted/im0.png @slanted/im1.png OUT --also depth-mm --calib left --calib right --max-disparity 23";
         run(&folder, &line.replace("OUT", out)).succeeded()
     };
-    let remedy = "& say the right one in the file by an entry `unit`: mm, cm or m";
+    let remedy = "& give the right one in the file as an entry `unit`: mm, cm or m";
     depth(&ros("-34.48"), "d.pfm").is_silent_on("apart");
     depth(&ros("-0.03448"), "small.pfm").says(&format!("warning & 0.00016 m apart {remedy}"));
     depth(&ros("-34480"), "large.pfm").says(&format!("warning & 160 m apart {remedy}"));
@@ -546,7 +547,8 @@ fn a_rectification_of_another_size_is_used_or_doubted() {
 fn an_empty_view_is_reported() {
     let folder = Folder::new();
     fs::write(folder.join("a-file"), turned(&opencv(), "R", 70.0)).unwrap();
-    rectify(&folder, "a-file").failed(1, "a-file & view of which & % shows the image & check its rotations");
+    rectify(&folder, "a-file")
+        .failed(1, "a-file & view of which only & % shows the image & check its rotations");
 }
 
 /// KITTI's `calib_cam_to_cam.txt` for the cameras of `testdata/raw` as colour cameras, away from camera 0.
@@ -648,7 +650,7 @@ fn other_files_are_not_taken_for_a_calibration() {
         ("deep", format!("<a>{}{}</a>", deep.0, deep.1).into_bytes(), "too many levels"),
         ("keys", format!("---\n{}", keys.collect::<String>()).into_bytes(), "too many entries"),
         ("elements", format!("<a>{}</a>", elements.collect::<String>()).into_bytes(), "too many entries"),
-        ("bytes", vec![0, 159, 146, 150, 10], "bytes that are no text"),
+        ("bytes", vec![0, 159, 146, 150, 10], "bytes that are not text"),
         ("large", vec![b' '; (1 << 20) + 1], "larger than any calibration file"),
         ("half", "cam0=[100 0 30; 0 100 20; 0 0 1]\n".into(), "K1, D1, K2 and D2"),
         ("left", ros("0").into_bytes(), "of one camera & the other one too"),
@@ -687,7 +689,7 @@ fn every_command_refuses_files_without_a_calibration() {
     let before = listing(&folder);
     let (raw, end) = ("@raw/left.png @raw/right.png", "--max-disparity 31");
     for (files, words) in [
-        ("@raw/left.png", "left.png: is a PNG image, and no calibration"),
+        ("@raw/left.png", "left.png: is a PNG image, not a calibration"),
         ("readme.md", "readme.md: is no calibration of a known form"),
         ("words.txt", "words.txt: is no calibration of a known form"),
         ("key_value.txt", "key_value.txt: is no calibration of a known form"),

@@ -6,7 +6,7 @@ use super::*;
 fn the_demo_gives_the_map_of_the_command_it_prints() {
     let folder = Folder::new();
     let told = run(&folder, "demo").succeeded();
-    told.says("320 x 240, 48 labels & points; unit: m");
+    told.says("320 x 240, 48 disparities & points; unit: m");
     for (name, scene) in [("left.png", "mixed/im0.png"), ("right.png", "mixed/im1.png")] {
         assert_eq!(
             fs::read(folder.join("mrfgs-demo").join(name)).unwrap(),

@@ -1,10 +1,9 @@
-//! The examples of the README and the guide: each runs as written and prints the lines below it, or is listed here with the reason why it
+//! The examples of the README and of all pages of the guide: each runs as written and prints the lines below it, or is listed here with the reason why it
 //! is not run.
 
+use super::documents::guide;
 use super::recordings::record_drive;
 use super::*;
-
-const DOCUMENTS: [&str; 2] = ["README.md", "docs/guide.md"];
 
 /// The first lines of examples that are not run, with reasons.
 const NOT_RUN: &[(&str, &str)] = &[
@@ -18,6 +17,8 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("scripts/web --serve 8000", "takes Node.js"),
     ("scripts/web --test", "needs Node.js and browsers"),
     ("scripts/test", "runs this"),
+    ("cargo run --release --example render-scenes -- film passing 320 240 48 8", "compiles"),
+    ("scripts/recordings --example drive.mcap", "installs Python packages"),
     ("export PKG_CONFIG_PATH=~/.local/lib/pkgconfig LD_LIBRARY_PATH=~/.local/lib", "scripts/c tries it"),
     ("cc video.c $(pkg-config --cflags --libs mrfgs)", "scripts/c tries it"),
     // These need other programs.
@@ -50,6 +51,7 @@ const NOT_RUN: &[(&str, &str)] = &[
         "needs cameras; scripts/node tries it",
     ),
     ("mrfgs ros --method fast --max-disparity 63", "needs cameras; scripts/node tries it"),
+    ("mrfgs ros --method fast --also depth,points", "needs cameras; scripts/node tries it"),
     (
         "mrfgs ros --method fast --also depth,points --remap left/image_raw:=/camera/infra1/image_rect_raw --remap right/image_raw:=/camera/infra2/image_rect_raw",
         "needs cameras; scripts/node tries it",
@@ -194,6 +196,20 @@ fn workshop() -> Folder {
     folder
 }
 
+/// Renders the frames of `cargo run --example render-scenes -- film passing 320 240 48 8`.
+fn render_film(folder: &Path) {
+    for side in ["left", "right"] {
+        fs::create_dir_all(folder.join("film").join(side)).unwrap();
+    }
+    for step in 0..8 {
+        let scene = scenes::passing(step, 320, 240, 48);
+        for (side, view) in [("left", &scene.left), ("right", &scene.right)] {
+            let picture = image::RgbImage::from_raw(320, 240, view.data().as_flattened().to_vec()).unwrap();
+            picture.save(folder.join(format!("film/{side}/{step:06}.png"))).unwrap();
+        }
+    }
+}
+
 /// A line without times, thread counts and repeated spaces, which depend on the machine; with `measures`, without any numbers.
 fn plain(line: &str, measures: bool) -> String {
     let words: Vec<&str> = line.split_whitespace().collect();
@@ -258,9 +274,13 @@ fn fault(folder: &Path, example: &Example) -> Option<String> {
 fn every_example_prints_what_is_shown() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let (mut ran, mut named, mut faults) = (0, Vec::new(), Vec::new());
-    for document in DOCUMENTS {
+    for document in std::iter::once("README.md".to_owned()).chain(guide()) {
         let folder = workshop();
-        for block in blocks(&fs::read_to_string(root.join(document)).unwrap()) {
+        let text = fs::read_to_string(root.join(&document)).unwrap();
+        if text.contains("film/left") {
+            render_film(&folder);
+        }
+        for block in blocks(&text) {
             if block.iter().any(|example| example.code.contains("mrfgs sequence")) {
                 let _ = fs::remove_dir_all(folder.join("maps"));
             }

@@ -17,7 +17,7 @@ const WRONG: &[(&str, &str, &str, &str)] = &[
         "EuRoC",
         "[240, 180]",
         "[240, 181]",
-        "the calibration is for images of 240 x 180, 240 x 181 and these are 240 x 180 & --calib-crop",
+        "the calibration is for images of 240 x 180, 240 x 181, but these are 240 x 180 & --calib-crop",
     ),
     ("ORB-SLAM3", "\"PinHole\"", "\"Cylinder\"", "Camera.type: expected PinHole & `Cylinder` & ORB-SLAM's"),
     ("ORB-SLAM3", "Stereo.T_c1_c2", "Stereo.T", "Stereo.T_c1_c2 is missing & ORB-SLAM's"),
@@ -216,7 +216,7 @@ fn settings_of_rectified_pairs_give_depths() {
         "rectified.2.fx": 9, "rectified.3.width": 240, "rectified.3.height": 180, "rectified.3.fx": 0}"#;
     assert!(depths(realsense) == first);
     for (from, to, words) in [
-        ("180", "181", "is for images of 640 x 400, 240 x 181, and these are 240 x 180"),
+        ("180", "181", "is for images of 640 x 400, 240 x 181, but these are 240 x 180"),
         ("-160", "0", "baseline: expected a number of millimetres other than 0 & RealSense's"),
         ("\"rectified.1.fx\": 215.5", "\"rectified.1.fx\": -1", "rectified.1.fx: expected a number above 0"),
         ("rectified.1.ppy", "rectified.1.pp", "rectified.1.ppy is missing"),

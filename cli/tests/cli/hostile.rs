@@ -164,6 +164,6 @@ mod memory {
         };
         fs::write(folder.join("claim.png"), png.bytes()).unwrap();
         let line = "match claim.png claim.png out.pfm --max-disparity 9 --device cpu --max-pixels 900000000";
-        limited(&folder, line).failed(1, "1.7 GiB of memory are needed and cannot be had");
+        limited(&folder, line).failed(1, "1.7 GiB of memory are needed, but the system refuses them");
     }
 }

@@ -34,6 +34,8 @@ mod render_cloud;
 mod report;
 mod results;
 mod robust;
+#[path = "../../../testdata/scenes.rs"]
+mod scenes;
 mod sequences;
 mod steady;
 mod turned;

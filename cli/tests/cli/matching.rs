@@ -18,7 +18,7 @@ fn match_writes_every_output_in_every_format() {
     let told = run(&folder, &format!("{line} {first}")).succeeded();
     assert_eq!(told.stdout, "");
     assert_eq!(told.stderr.lines().count(), 1, "{}", told.stderr);
-    told.says("mrfgs: 240 x 180, 32 labels,  &  s on the CPU path, 2 threads\n");
+    told.says("mrfgs: 240 x 180, 32 disparities,  &  s on the CPU path, 2 threads\n");
 
     let map = read::read_disparity(&at("a.pfm")).unwrap();
     let raw = read::read_disparity(&at("a.raw.pfm")).unwrap();
@@ -105,7 +105,7 @@ fn a_missing_range_is_estimated() {
     let (least, most) = (finite().fold(f32::MAX, f32::min), finite().fold(f32::MIN, f32::max));
     for extra in ["", "--max-disparity auto"] {
         let said = run(&folder, &format!("match left.png right.png out.pfm {extra}")).succeeded().stderr;
-        let line = said.lines().find(|l| l.contains("by sparse matches")).expect("said on stderr");
+        let line = said.lines().find(|l| l.contains("estimated from the images")).expect("said on stderr");
         let numbers: Vec<f32> =
             line.split_whitespace().filter_map(|w| w.trim_end_matches(',').parse().ok()).collect();
         assert!(numbers[0] <= least && numbers[1] >= most, "{line} and the truth is {least} to {most}");
@@ -138,9 +138,9 @@ fn an_estimated_range_is_widened_if_the_scene_exceeds_it() {
     }
     let line = "match left.png right.png out.pfm --method fast --json out.json";
     let found = run(&folder, line).succeeded();
-    found.says("disparities 0 to 40, by sparse matches");
-    found.says("disparities 0 to 60 in a second match, because the scene goes beyond the sparse matches");
-    found.says("61 labels");
+    found.says("disparities 0 to 40, estimated from the images");
+    found.says("disparities 0 to 60 in a second match, because the scene goes beyond the estimate");
+    found.says("61 disparities");
     assert!(fs::read_to_string(folder.join("out.json")).unwrap().contains("\"labels\": 61"));
     let map = read::read_disparity(&folder.join("out.pfm")).unwrap();
     assert!((47.0..49.0).contains(&map[(200, 200)]), "{}", map[(200, 200)]);
@@ -155,7 +155,7 @@ fn an_estimated_range_is_widened_if_the_scene_exceeds_it() {
     // A user's own range is kept.
     run(&folder, "match left.png right.png out.pfm --method fast --max-disparity 40")
         .succeeded()
-        .says("41 labels");
+        .says("41 disparities");
 }
 
 /// If the pair was rectified with a wrong calibration, the warning does not suggest to rectify it.
@@ -174,7 +174,7 @@ fn misaligned_rows_after_rectification_are_reported() {
     };
     let told = run(&folder, &line("lower.png")).succeeded();
     told.says("warning: after rectification matches lie & px above or below their row: the calibration");
-    assert!(!told.stderr.contains("rectify it first"), "{}", told.stderr);
+    assert!(!told.stderr.contains("add --rectify"), "{}", told.stderr);
     let good = run(&folder, &line(&raw("right.png"))).succeeded();
     assert!(!good.stderr.contains("warning"), "{}", good.stderr);
 }
@@ -188,7 +188,10 @@ fn a_pair_that_is_not_rectified_is_named() {
             image.crop_imm(0, top, 320, 230).save(folder.join(to)).unwrap();
         }
         let told = run(&folder, "match left.png right.png out.pfm --max-disparity 47").succeeded();
-        assert_eq!(told.stderr.contains("not rectified"), warns, "{told:?}");
+        let words = ["not rectified", "add --rectify (and --calib FILE if you have a calibration)"];
+        for word in words {
+            assert_eq!(told.stderr.contains(word), warns, "{told:?}");
+        }
     }
 }
 
@@ -388,19 +391,19 @@ fn little_memory_makes_tiles() {
     assert!(!one.stdout.contains("tiles") && !one.stdout.contains("whole image"), "{one:?}");
     let words = "240 x 180 pixels, disparities 0 to 31 (32 labels) & in 4 tiles of up to & whole image & all";
     with("--dry-run --memory 16MiB").succeeded().prints(words);
-    with("").succeeded().says("32 labels, 16 iterations");
-    with("--memory 16MiB").succeeded().says("32 labels, 4 tiles, 16 iterations");
+    with("").succeeded().says("32 disparities, 16 iterations");
+    with("--memory 16MiB").succeeded().says("32 disparities, 4 tiles, 16 iterations");
     assert_eq!(read::read_disparity(&folder.join("out.pfm")).unwrap().size(), (240, 180));
     let inspect = |more: &str| run(&folder, &format!("inspect {pair} --device cpu --memory 16MiB {more}"));
     let told = inspect("").succeeded();
-    told.says("32 labels, 4 tiles, 16 iterations");
+    told.says("32 disparities, 4 tiles, 16 iterations");
     for (stage, runs) in [("cost", 4), ("right_view", 4), ("left_right_check", 1), ("plane", 1)] {
         let row = told.stdout.lines().find(|line| line.starts_with(&format!("{stage}  "))).unwrap();
         assert_eq!(row.split_whitespace().rev().nth(3), Some(&*runs.to_string()), "{row}");
     }
     // The folder of steps needs a match without tiles.
     let before = listing(&folder);
-    inspect("steps").failed(2, "DIR & in one piece & give --memory");
+    inspect("steps").failed(2, "DIR & in memory at once & give --memory");
     assert!(listing(&folder) == before);
 }
 

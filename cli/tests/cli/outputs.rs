@@ -217,7 +217,7 @@ fn depths_that_come_out_empty() {
     for (more, words) in [
         (
             format!("{negative} --also depth,points"),
-            format!("warning: & {front} & try --sign right-minus-left, or exchange the two images"),
+            format!("warning: & {front} & try --sign right-minus-left, or swap the two images"),
         ),
         (
             format!("{negative} --sign left-minus-right --also points"),
@@ -229,7 +229,7 @@ fn depths_that_come_out_empty() {
         ),
         (
             "--also depth,points --min-confidence 255 --max-disparity 31".into(),
-            "warning: --min-confidence leaves nothing & lower it".into(),
+            "warning: --min-confidence leaves no depths and no points: lower it".into(),
         ),
         (
             "--also points --clip-depth 0.01 --max-disparity 31".into(),
@@ -269,7 +269,7 @@ fn ranges_may_be_depths() {
         &format!("by-disparity.pfm --max-disparity {nearest} --min-disparity {farthest}"),
     );
     let said = matched(&folder, "repetitive", "by-depth.pfm --min-depth 1.3 --max-depth 2.9 --json d.json");
-    assert!(said.contains(&format!("{} labels", nearest - farthest + 1.0)), "{said}");
+    assert!(said.contains(&format!("{} disparities", nearest - farthest + 1.0)), "{said}");
     let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
     assert!(bytes("by-depth.pfm") == bytes("by-disparity.pfm"));
     // The opposite sign gives the same depths.
@@ -360,7 +360,7 @@ fn a_calibration_file_elsewhere_gives_the_range() {
     let folder = workshop();
     run(&folder, "match left.png right.png out.pfm --calib camera/calib.txt")
         .succeeded()
-        .says(", 17 labels, ");
+        .says(", 17 disparities, ");
     // Without depth outputs it may be incomplete.
     run(&folder, "match left.png right.png out.pfm --max-disparity 9 --calib half/calib.txt").succeeded();
 }
@@ -368,7 +368,9 @@ fn a_calibration_file_elsewhere_gives_the_range() {
 #[test]
 fn the_pictures_of_the_guide_are_up_to_date() {
     let folder = Folder::new();
-    matched(&folder, "mixed", "d.pfm --also preview,points");
+    matched(&folder, "mixed", "d.pfm --also preview");
+    // With the filled pixels, so that the surface is closed.
+    run(&folder, "depth d.pfm --calib @mixed/calib.txt --left @mixed/im0.png --also points").succeeded();
     let at = |name: &str| folder.join(name).to_str().unwrap().to_owned();
     render_cloud::run(&[at("d.points.ply"), at("cloud.png")]).unwrap();
     // Another system's trigonometric functions may move a point to the next pixel.
@@ -530,7 +532,7 @@ fn standard_output_takes_the_map_and_nothing_else() {
     assert_eq!(output.status.code(), Some(0));
     assert!(output.stdout == fs::read(folder.join("out.pfm")).unwrap(), "the bytes of the file");
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("60 x 40, 10 labels"), "{said}");
+    assert!(said.contains("60 x 40, 10 disparities"), "{said}");
     assert!(listing(&folder) == before);
 }
 

@@ -190,7 +190,7 @@ fn recordings_give_the_maps_of_match() {
     let run_it =
         |flags: &str, output: &str| run(&folder, &format!("sequence drive.mcap {output} {RANGE} {flags}"));
     record(&path, &images("image_rect", 0));
-    run_it("", "maps").succeeded().says("3 frames of 64 x 48, 24 labels");
+    run_it("", "maps").succeeded().says("3 frames of 64 x 48, 24 disparities");
     assert_eq!(found(&folder.join("maps"), &["pfm"]), wanted);
     assert_eq!(listing(&folder.join("maps")).len(), 3);
     // In any order, with other names, and not triggered simultaneously.

@@ -110,7 +110,7 @@ fn files_in_any_order_give_the_maps_of_match() {
     {
         let output = format!("maps{i}");
         let line = format!("sequence {} {RANGE}", frames.replace("OUT", &output));
-        run(&folder, &line).succeeded().says("3 frames of 64 x 48, 24 labels");
+        run(&folder, &line).succeeded().says("3 frames of 64 x 48, 24 disparities");
         assert_eq!(maps(&folder.join(&output), names), wanted, "{line}");
         assert_eq!(listing(&folder.join(&output)).len(), 3);
     }

@@ -41,14 +41,14 @@ fn a_pair_is_rectified_by_its_matches() {
     let end = "--device cpu";
     // Without the flag no range is found, and the error suggests it.
     run(&folder, &format!("match @raw/left.png @raw/right.png a.pfm {end}"))
-        .failed(1, "too few matches & not rectified & --rectify & --max-disparity");
+        .failed(1, "no range & not rectified & --rectify & --calib FILE & --max-disparity");
     assert!(!folder.join("a.pfm").exists());
     // Nor where the views are of two scenes.
     for (view, name) in [("slanted/im0.png", "l.png"), ("repetitive/im1.png", "r.png")] {
         fs::copy(scene(view), folder.join(name)).unwrap();
     }
     run(&folder, &format!("match l.png r.png a.pfm {end}"))
-        .failed(1, "too few matches & check that both show one scene, or give --max-disparity");
+        .failed(1, "too few matches & check that both show the same scene, or give --max-disparity");
     let said = run(
         &folder,
         &format!("match @raw/left.png @raw/right.png a.pfm --rectify {end} --json a.json --also preview"),

@@ -48,7 +48,7 @@ fn compared(
 ) -> Option<(u64, bool)> {
     let own = (disparity + FRACTION / 2).div_euclid(FRACTION);
     let tolerance = (1 + i32::from(sigma) / FRACTION).min(MOST_TOLERANCE);
-    let around = |d: i32| (d - tolerance..=d + tolerance);
+    let around = |d: i32| d - tolerance..=d + tolerance;
     let cost = |d: i32| around(d).filter_map(|d| unlikeness(pair, (x as i32, y as i32), d)).min();
     let own_cost = cost(own)?;
     let span = range.max - range.min;

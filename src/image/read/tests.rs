@@ -340,7 +340,7 @@ fn mismatched_images_are_refused() {
     refused(pair(&left, &small, None), &["left.png is 4 x 3", "small.png is 2 x 3"]);
     refused(pair(&left, &left, Some(&small)), &["small.png is 2 x 3", "left.png is 4 x 3", "mask"]);
     let float = f.tiff::<colortype::Gray32Float>("float.tif", &[0.0; N]);
-    refused(pair(&left, &float, None), &["left.png", "float.tif", "one format"]);
+    refused(pair(&left, &float, None), &["left.png", "float.tif", "the same format"]);
 }
 
 #[test]
@@ -361,7 +361,7 @@ fn files_that_are_no_images_are_refused() {
         (
             "a.png",
             b"GIF89a.....................",
-            "is a GIF image, which is not read here: convert it to PNG",
+            "is a GIF image, which is not supported: convert it to PNG",
         ),
         ("huge.pgm", b"P5\n4000000000 4000000000\n255\n", "at most"),
         ("none.pgm", b"P5\n0 5\n255\n", ""),

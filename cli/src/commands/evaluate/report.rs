@@ -129,7 +129,7 @@ pub(super) fn pictures(
     add("error", "Signed error", alt, legend, &colour::error(estimate, truth, ERROR_LIMIT))?;
     if let Some((_, maps)) = matched {
         let alt = "confidence of every pixel, bright is sure";
-        let legend = "How sure each pixel is, 0 to 255; bright is sure. The lead of the best disparity over the runner-up in 1/8 nat, averaged over neighbouring pixels.";
+        let legend = "How sure each pixel is, 0 to 255; bright is sure. It is how much worse the second-best disparity fits (in 1/8 nat), averaged over neighbouring pixels.";
         add("confidence", "Confidence", alt, legend.into(), &colour::grey(&maps.confidence))?;
         let (alt, picture) = ("the status of each pixel", colour::validity(&maps.validity));
         add("validity", "Validity", alt, validity_legend(), &picture)?;

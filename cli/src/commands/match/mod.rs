@@ -16,6 +16,11 @@ use crate::{console, matching, plan, stop};
 
 const EXAMPLES: &str = "\
 Examples:
+  # Two hand-held photos, and the map in colours:
+  mrfgs match l.jpg r.jpg d.pfm --rectify --also preview
+  # Raw images and a calibration, with depth:
+  mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
+  # Rectified images, with a range of disparities:
   mrfgs match left.png right.png disparity.pfm --max-disparity 63
   mrfgs match l.tif r.tif d.tif --min-disparity -40 --max-disparity 25
   mrfgs match l.png r.png d.png --max-disparity 90 --also confidence
@@ -32,16 +37,15 @@ Examples:
   mrfgs match l.png r.png d.pfm --focal 700 --baseline 120mm --also depth
   # Both views in one file of a stereo camera:
   mrfgs match photo.mpo d.pfm --rectify
-  # Two hand-held photos, without a calibration:
-  mrfgs match l.jpg r.jpg d.pfm --rectify
-  # Raw images and a calibration:
-  mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
   # With points of a LiDAR in the left view, as lines of x,y,disparity:
   mrfgs match l.png r.png d.pfm --max-disparity 90 --prior points.csv
   # Points as LAZ, in the frame of the left camera before rectification:
   mrfgs match l.png r.png d.pfm --rectify --calib c --also points-original.laz";
 
-/// Match a pair of images and write its disparity map
+/// Turn a pair of images into a disparity map
+///
+/// The map says for each pixel of LEFT how far it moves to the left in RIGHT: LEFT (x, y) with disparity d appears at RIGHT (x - d, y). Near
+/// things move farther. Matching points must be in the same row; --rectify sees to that.
 ///
 /// LEFT is the reference view; all maps have its size. Images are PNG, JPEG, PNM, TIFF, BMP, PFM or NPY, whatever their extension.
 /// Transparent, non-finite and no-data pixels are ignored.
@@ -197,15 +201,15 @@ fn empty(args: &Args, outcome: &Outcome, is_found: bool) -> Option<String> {
     let rig = outcome.rig.as_ref()?;
     let in_front = InFront::of(&outcome.maps.final_map(), rig);
     if in_front.all == 0 {
-        let why = "no pixel has a disparity, and so none has a depth: check that both images show one scene, and the range";
+        let why = "no pixel has a disparity, so there is no depth: check that both images show the same scene, and check the range";
         return Some(why.into());
     }
     let turned = if is_found {
-        "the views may be exchanged: exchange the two images".into()
+        "the views may be swapped: swap the two images".into()
     } else {
-        format!("{}, or exchange the two images", other_sign(args.sign))
+        format!("{}, or swap the two images", other_sign(args.sign))
     };
-    let check = "check that the calibration (doffs, baseline) is of this pair, and that the range is of what is in front of the cameras";
+    let check = "check that the calibration (doffs, baseline) belongs to this pair, and that the range covers what is in front of the cameras";
     in_front.doubt(&turned, check).or_else(|| args.also.left_out(outcome))
 }
 

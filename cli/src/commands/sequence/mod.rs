@@ -215,7 +215,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         return Err(Failure::usage("--recalibrate", reason));
     }
     if !args.quiet {
-        input.say_range(sign, " in the first frame");
+        input.say_range(sign, " of the first frame");
     }
     // Messages with cameras and --recalibrate use a calibration if there is one, but do not require all of it.
     let mut rig = if cameras.is_none() && (kind.takes_messages() || args.recalibrate) {

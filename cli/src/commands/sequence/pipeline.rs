@@ -97,7 +97,7 @@ impl Pipeline {
             let seconds = start.elapsed().as_secs_f64();
             let (width, height) = size;
             console::say(&format!(
-                "{done} frame{} of {width} x {height}, {} labels, in {seconds:.2} s: {:.1} per second{}",
+                "{done} frame{} of {width} x {height}, {} disparities, in {seconds:.2} s: {:.1} per second{}",
                 plural(done),
                 self.range.labels(),
                 done as f64 / seconds,
