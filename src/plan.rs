@@ -185,7 +185,7 @@ impl Plan {
         } else {
             (width, height, range)
         };
-        let cost_units = method.cost.matching.facts().units;
+        let cost_units = method.cost.units();
         let mut levels = Vec::new();
         let mut gain = 1.0;
         let (mut size, mut min, mut max) = ((width, height), range.min, range.max);
@@ -477,7 +477,7 @@ mod tests {
             let mut method = Method::default();
             method.messages.temperature = temperature;
             for gain in [1.0, 243.0] {
-                let scale = EvidenceScale::new(gain, method.cost.matching.facts().units, &method);
+                let scale = EvidenceScale::new(gain, method.cost.units(), &method);
                 let mut last = 0;
                 for difference in 0..=u16::MAX {
                     let e = scale.apply(difference);

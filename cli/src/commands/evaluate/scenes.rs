@@ -28,6 +28,9 @@ pub(super) struct SceneArgs {
     /// third size.
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = scale)]
     pub(super) truth_scale: Option<f32>,
+    /// Rounds the ground truth to whole pixels, as programs have it that divide an 8-bit map by its scale in integers
+    #[arg(long)]
+    pub(super) truth_rounded: bool,
     #[command(flatten)]
     pub(super) reading: ReadingArgs,
 }
@@ -81,11 +84,14 @@ impl RunArgs {
         files::check_json(self.json(), read)?;
         let folders = self.folders(dirs)?;
         let mut matcher = Matcher::builder().execution(execution).build()?;
-        let SceneArgs { reading, truth_scale, .. } = &self.scenes;
+        let SceneArgs { reading, truth_scale, truth_rounded, .. } = &self.scenes;
         let mut pairs = Vec::new();
         let mut ran_on = None;
         for folder in folders {
-            let scene = folder.read(reading.reader(), *truth_scale)?;
+            let mut scene = folder.read(reading.reader(), *truth_scale)?;
+            if *truth_rounded {
+                scene.ground = scene.ground.rounded();
+            }
             let (pair, name) = (&scene.pair, Some(scene.name.as_str()));
             let (matched, time) =
                 matching::run(&mut matcher, pair, scene.range.into(), &method, name, false, None)?;
