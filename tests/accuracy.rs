@@ -246,7 +246,7 @@ fn the_papers_presets_on_real_pairs() {
     let mut strict = Method::paper();
     strict.messages.agreement = Agreement::Strict;
     let [_, [_, _, bad2]] = means(&strict);
-    assert!(bad2 > 23.5, "{bad2}");
+    assert!(bad2 > 23.2, "{bad2}");
 }
 
 /// FNV-1a of a map's values.
