@@ -86,15 +86,15 @@ impl Reference {
     fn step(&mut self) {
         let beliefs: Vec<Vec<f64>> = (0..self.plan.levels.len()).map(|z| self.beliefs(z)).collect();
         for (z, belief) in beliefs.iter().enumerate() {
-            self.dependency[z] = self.from_dependency(z, belief);
+            self.dependency[z] = self.dependency_messages(z, belief);
         }
         for z in 1..beliefs.len() {
-            (self.down[z - 1], self.up[z]) = self.from_resolution(z, &beliefs[z - 1], &beliefs[z]);
+            (self.down[z - 1], self.up[z]) = self.resolution_messages(z, &beliefs[z - 1], &beliefs[z]);
         }
     }
 
     /// The messages of the dependency factors: one label of the receiver leaves the others a single choice.
-    fn from_dependency(&self, z: usize, belief: &[f64]) -> Vec<f64> {
+    fn dependency_messages(&self, z: usize, belief: &[f64]) -> Vec<f64> {
         let (labels, slots) = (self.plan.levels[z].labels, self.plan.slots());
         let mut out = self.dependency[z].clone();
         for factor in 0..self.plan.levels[z].pixels() {
@@ -122,7 +122,7 @@ impl Reference {
     }
 
     /// The messages (down, up) of the resolution factors between level `z` and the next finer one.
-    fn from_resolution(&self, z: usize, fine: &[f64], coarse: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    fn resolution_messages(&self, z: usize, fine: &[f64], coarse: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let (f, c) = (&self.plan.levels[z - 1], &self.plan.levels[z]);
         let offset = self.plan.label_offset(z);
         // The fine labels that agree with a coarse one, and the coarse labels that agree with a fine one.
