@@ -10,6 +10,8 @@ struct Params {
     colour_weight: u32,
     colour_variance: u32,
     sad_radius: i32,
+    // Steps per 8-bit level.
+    sad_steps: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -80,7 +82,7 @@ fn sad(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index)
                 if xr >= 0 && xr < width {
                     if (pixel.z | right[(y - top) * pitch + xr].z) == 0u {
                         let n = counts[i][j];
-                        c = min((sums[i][j] + 384u * n) / (768u * n), COST_MAX);
+                        c = min((params.sad_steps * sums[i][j] + 384u * n) / (768u * n), COST_MAX);
                     }
                 }
                 costs[j] = c;

@@ -195,7 +195,7 @@ impl Plan {
         } else {
             (width, height, range)
         };
-        let cost_units = method.cost.matching.facts().units;
+        let cost_units = method.cost.units();
         let mut levels = Vec::new();
         let mut gain = 1.0;
         let (mut size, mut min, mut max) = ((width, height), range.min, range.max);
@@ -495,7 +495,7 @@ mod tests {
             let mut method = Method::default();
             method.messages.temperature = temperature;
             for gain in [1.0, 243.0] {
-                let scale = EvidenceScale::new(gain, method.cost.matching.facts().units, &method);
+                let scale = EvidenceScale::new(gain, method.cost.units(), &method);
                 let mut last = 0;
                 for difference in 0..=u16::MAX {
                     let e = scale.apply(difference);
@@ -506,6 +506,28 @@ mod tests {
                     last = e;
                 }
             }
+        }
+    }
+
+    /// Evidence of the paper at level 0, in units by steps of the cost: 10 nats per 8-bit level, up to 8 nats.
+    #[test]
+    fn the_prior_of_the_paper_is_graded() {
+        let range = DisparityRange::new(0, 59).unwrap();
+        let values = |method: &Method| -> Vec<u8> {
+            let scale = Plan::new(450, 375, range, method).unwrap().levels[0].evidence;
+            (0..=16).map(|steps: u16| scale.apply(steps << COST_FRACTION_BITS)).collect()
+        };
+        let paper = Method::preset("paper").unwrap();
+        let graded = values(&paper);
+        for (steps, &e) in graded.iter().enumerate() {
+            let exact = (4.0 * 10.0 * steps as f64 / 16.0).min(32.0);
+            assert!((f64::from(e) - exact).abs() <= 0.5, "{steps} steps: {e} against {exact}");
+        }
+        // Control: costs in whole levels have two values, whatever the temperature.
+        for temperature in [0.001, 0.1, 0.125] {
+            let mut whole = paper.clone();
+            (whole.cost.sad_steps, whole.messages.temperature) = (1, temperature);
+            assert_eq!(values(&whole)[1..], [32; 16]);
         }
     }
 

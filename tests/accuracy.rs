@@ -232,8 +232,8 @@ fn the_papers_presets_on_real_pairs() {
         })
     };
     let floors = [
-        ("paper", [[2.26, 35.7, 22.7], [2.06, 36.8, 21.3]]),
-        ("fgs", [[2.30, 35.4, 22.9], [1.90, 36.8, 19.4]]),
+        ("paper", [[2.15, 36.0, 22.0], [1.98, 37.0, 20.8]]),
+        ("fgs", [[2.25, 35.5, 22.5], [1.86, 36.8, 19.0]]),
     ];
     for (preset, floors) in floors {
         let found = means(&Method::preset(preset).unwrap());
@@ -246,7 +246,7 @@ fn the_papers_presets_on_real_pairs() {
     let mut strict = Method::paper();
     strict.messages.agreement = Agreement::Strict;
     let [_, [_, _, bad2]] = means(&strict);
-    assert!(bad2 > 23.5, "{bad2}");
+    assert!(bad2 > 23.2, "{bad2}");
 }
 
 /// FNV-1a of a map's values.
@@ -259,14 +259,14 @@ fn checksum(map: &Plane<i32>) -> u64 {
 #[test]
 fn the_presets_of_the_paper_are_pinned() {
     let pins = [
-        ("paper", "slanted", 0xcdd8_699e_9808_b317),
-        ("paper", "thin", 0x1d57_7f25_1e91_d775),
-        ("paper", "wall", 0x23ec_0a3b_ace9_9d47),
-        ("paper", "repetitive", 0x8e18_f607_93b9_d687),
-        ("paper", "exposure", 0xf3ca_a352_d074_f4d0),
-        ("paper", "mixed", 0xb327_22c3_7944_75b2),
-        ("fgs", "slanted", 0x139c_243c_de6e_db6e),
-        ("fgs", "mixed", 0x665c_813d_b690_5fbb),
+        ("paper", "slanted", 0x3c6c_625f_729f_4978),
+        ("paper", "thin", 0xf203_7fa4_9e32_0b6e),
+        ("paper", "wall", 0x5edd_2c95_4e9d_a08c),
+        ("paper", "repetitive", 0xa279_323a_93f6_9290),
+        ("paper", "exposure", 0xb832_a4ce_c53d_1b6d),
+        ("paper", "mixed", 0xc8a1_bbf0_4cd1_338f),
+        ("fgs", "slanted", 0x85ef_2448_416f_a895),
+        ("fgs", "mixed", 0xcf90_3805_da68_b2e4),
     ];
     let found = pins.map(|(preset, scene, _)| {
         let method = Method::preset(preset).unwrap();

@@ -23,6 +23,14 @@ impl GroundTruth {
         Ok(Self { truth, mask })
     }
 
+    /// The same ground truth in whole pixels: every known disparity rounded to the nearest, ties away from 0.
+    ///
+    /// A program has it so that divides an 8-bit map by its scale in integers, as MATLAB does with `uint8`.
+    #[must_use]
+    pub fn rounded(&self) -> Self {
+        Self { truth: self.truth.map(|d| d.round()), mask: self.mask.clone() }
+    }
+
     /// The true disparities, not finite where unknown.
     #[must_use]
     pub fn truth(&self) -> &Plane<f32> {

@@ -274,3 +274,18 @@ fn contrast(image: &Image) -> Plane<f32> {
     };
     Plane::new(image.width(), image.height(), pixels.iter().zip(masked).map(level).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The clusters of an image of Teddy's size come from every sixth pixel in x and y.
+    #[test]
+    fn samples_are_about_as_many_as_said() {
+        let seen = samples(&Plane::filled(450, 375, false));
+        assert_eq!((seen.len(), seen[0], seen[1]), (75 * 62, (3, 3), (9, 3)));
+        assert!(seen.len().abs_diff(SAMPLES) < SAMPLES / 4);
+        // Control: a small image gives all its pixels.
+        assert_eq!(samples(&Plane::filled(60, 60, false)).len(), 3600);
+    }
+}

@@ -1,6 +1,6 @@
 //! Options of the matching cost.
 
-use super::row::{odd, one_of, options, real, words};
+use super::row::{odd, one_of, options, real, whole, words};
 use crate::error::OptionError;
 
 words! {
@@ -16,7 +16,7 @@ words! {
     ///   ```text
     ///   n    = the number of these places
     ///   S    = sum of |dr| + |dg| + |db| over them
-    ///   cost = min(floor((S + 384 n) / (768 n)), COST_MAX)         the mean in 8 bits, ties up
+    ///   cost = min(floor((`sad_steps` S + 384 n) / (768 n)), COST_MAX)     the mean in steps of 8-bit levels, ties up
     ///   ```
     ///
     /// - **Census**. The census of a pixel has a bit for each other place of its 9 x 7 neighbourhood,
@@ -53,9 +53,9 @@ words! {
 /// Properties of a matching cost.
 #[derive(Clone, Copy, Debug)]
 pub struct CostFacts {
-    /// Largest cost of a label, and so of one outside the image.
+    /// Largest cost of a label, and so of one outside the image, if `sad_steps` is 1.
     pub most: f64,
-    /// Cost units that stand for a cost of 1.
+    /// Cost units that stand for a cost of 1, if `sad_steps` is 1.
     pub units: f64,
     /// Cost units of the largest colour difference at full weight.
     pub colour_weight: u32,
@@ -94,6 +94,9 @@ options! {
             source "section 2.4: sad";
         /// Side of the window of the cost sad.
         sad_window: u32 = 7, takes odd(1..=31), unit "pixels", source "section 3.1: 7";
+        /// Steps per 8-bit level to which the cost sad is rounded. A cost is at most 254 steps, so finer steps cut
+        /// large costs off earlier.
+        sad_steps: u32 = 1, takes whole(1..=16), unit "steps per 8-bit level", source "not in the paper", for reproduction;
         /// From this standard deviation of the grey around a pixel on, ad-census weighs colour in full; below
         /// it, the weight falls with the variance.
         colour_contrast: f64 = 5.0, takes real(0.0..=128.0), unit "8-bit levels", source "not in the paper";
@@ -106,9 +109,26 @@ options! {
 }
 
 impl CostOptions {
-    /// Checks what a single row cannot: the range of `outside_cost` depends on `matching`.
+    /// Cost units that stand for a cost of 1: those of the matching cost, times `sad_steps` for the cost sad.
+    #[must_use]
+    pub fn units(&self) -> f64 {
+        self.matching.facts().units * self.steps()
+    }
+
+    /// Largest cost of a label, and so of one outside the image: that of the matching cost, divided by `sad_steps`
+    /// for the cost sad.
+    #[must_use]
+    pub fn most(&self) -> f64 {
+        self.matching.facts().most / self.steps()
+    }
+
+    fn steps(&self) -> f64 {
+        if self.matching == MatchingCost::Sad { f64::from(self.sad_steps) } else { 1.0 }
+    }
+
+    /// Checks what a single row cannot: the range of `outside_cost` depends on `matching` and `sad_steps`.
     pub(super) fn check(&self) -> Result<(), (String, OptionError)> {
-        let (value, high) = (self.outside_cost, self.matching.facts().most);
+        let (value, high) = (self.outside_cost, self.most());
         if value <= high {
             return Ok(());
         }

@@ -141,7 +141,8 @@ pub fn method(random: &mut Random, neighbours: usize) -> Method {
     m.cost.matching = random.pick(&[MatchingCost::ALL, &[MatchingCost::AdCensus]].concat());
     m.cost.colour_contrast = random.pick(&[0.0, 0.3, 5.0, 40.0, 128.0]);
     m.cost.sad_window = random.pick(&[1, 3, 5, 7, 9]);
-    let most = m.cost.matching.facts().most;
+    m.cost.sad_steps = random.pick(&[1, 1, 3, 16]);
+    let most = m.cost.most();
     m.cost.outside_cost = f64::from(random.within(0, (1000.0 * most) as u32)) / 1000.0;
     m.messages.temperature = random.log_within(0.001 * most, 6.0 * most);
     m.messages.evidence_cap = random.pick(&[0.25, 3.0, 8.0, 63.75]);

@@ -6,6 +6,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod interpolating;
 mod sum_product;
 mod trees;
 

@@ -29,7 +29,8 @@ fn cost() {
 fn cost_with_the_largest_window() {
     let mut random = Random::new(31);
     let mut method = random::method(&mut random, 0);
-    (method.cost.matching, method.cost.sad_window, method.cost.outside_cost) = (MatchingCost::Sad, 31, 20.0);
+    (method.cost.matching, method.cost.sad_window, method.cost.sad_steps) = (MatchingCost::Sad, 31, 16);
+    method.cost.outside_cost = 10.0;
     let plan = random::plan((37, 33), -3, 9, &method);
     let pair = random::pair(&mut random, 37, 33);
     for (name, mut backend) in backends() {

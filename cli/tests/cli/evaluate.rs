@@ -78,6 +78,26 @@ fn evaluate_gives_the_same_figures_for_a_written_map() {
     evaluated(&folder, "map map.pfm --truth @slanted/disp0GT.pfm").prints("map  final |");
 }
 
+#[test]
+fn a_rounded_truth_has_whole_pixels() {
+    let folder = Folder::new();
+    let truth = read::read_disparity(&scene("slanted/disp0GT.pfm")).unwrap();
+    truth.map(|d| (d + 0.5).floor()).save(folder.join("whole.pfm")).unwrap();
+    run(&folder, "match @slanted/im0.png @slanted/im1.png map.pfm --quiet").succeeded();
+    let figures = |line: &str| {
+        evaluated(&folder, &format!("{line} --json -")).json()["pairs"][0]["final"]["all"].clone()
+    };
+    let whole = figures("map map.pfm --truth whole.pfm");
+    assert_eq!(figures("map map.pfm --truth @slanted/disp0GT.pfm --truth-rounded"), whole);
+    let of_pair = figures("@slanted --truth-rounded");
+    for key in ["avg", "bad0.5"] {
+        let [one, other] = [&of_pair, &whole].map(|figures| figures[key].as_f64().unwrap());
+        assert!((one - other).abs() <= 1e-6 * other, "{key}: {one} and {other}");
+    }
+    // Control: without the flag, the truth keeps its fractions.
+    assert_ne!(figures("@slanted"), of_pair);
+}
+
 /// The ground truth of `slanted` in 8 bits, unknown in the top left corner: as stored, and as read in pixels.
 fn quantised(scale: f32) -> (GrayImage, Plane<f32>) {
     let truth = read::read_disparity(&scene("slanted/disp0GT.pfm")).unwrap();

@@ -275,6 +275,14 @@ fn inspect_shows_every_step() {
         {
             assert!(size(name).0 > 0);
         }
+        // Each level's map is also there in pixels of the level.
+        for z in 0..3 {
+            let map = read::read_disparity(&steps.join(format!("map-level-{z}.pfm"))).unwrap();
+            let (size, levels) = (size(&format!("map-level-{z}")), map.data());
+            assert_eq!(map.size().0 as u32, size.0);
+            assert!(levels.iter().all(|d| d.fract() == 0.0 && (0.0..=(20 >> z) as f32 + 1.0).contains(d)));
+            assert!(levels.iter().any(|d| d.total_cmp(&levels[0]).is_ne()), "level {z}");
+        }
         for name in more {
             assert!(size(name).0 >= 60, "{name}");
         }

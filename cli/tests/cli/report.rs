@@ -42,7 +42,7 @@ fn a_report_is_complete_and_self_contained() {
     }
 
     let (files, sources) = (attributes(&page, "data-file"), attributes(&page, "src"));
-    assert_eq!((files.len(), sources.len()), (14, 14));
+    assert_eq!((files.len(), sources.len()), (18, 18));
     assert!(attributes(&page, "alt").iter().all(|alt| alt.len() > 15));
     for (file, source) in files.iter().zip(sources) {
         let bytes = BASE64.decode(source.strip_prefix("data:image/png;base64,").unwrap()).unwrap();
@@ -57,7 +57,13 @@ fn a_report_is_complete_and_self_contained() {
         };
         assert_eq!((picture.width(), picture.height()), (w, h + legend), "{file}");
     }
-    assert_eq!(fs::read_dir(at("out")).unwrap().count(), 15);
+    assert_eq!(fs::read_dir(at("out")).unwrap().count(), 19);
+    // The raw map and its error are not those of the final one.
+    for [raw, finished] in [["raw", "disparity"], ["raw-error", "error"]] {
+        let [raw, finished] =
+            [raw, finished].map(|name| fs::read(at(&format!("out/1-Teddy-{name}.png"))).unwrap());
+        assert_ne!(raw, finished);
+    }
     // The left view is unchanged.
     let left = image::open(at("out/1-Teddy-left.png")).unwrap().into_rgb8();
     assert_eq!(left, image::open(at("Teddy/im0.png")).unwrap().into_rgb8());

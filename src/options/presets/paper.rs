@@ -21,6 +21,7 @@ impl Method {
             },
             cost: CostOptions {
                 matching: MatchingCost::Sad,
+                sad_steps: 16,
                 outside_cost: 10.0,
                 pyramid: Pyramid::Minimum,
                 ..CostOptions::default()

@@ -24,7 +24,10 @@ pub fn cost(plan: &Plan, pair: &Pair) -> Vec<u32> {
                     4 * (hamming as i64).min(40)
                 };
                 let cost = match plan.method.cost.matching {
-                    MatchingCost::Sad => sad(left, right, x, y, d, i64::from(plan.method.cost.sad_window)),
+                    MatchingCost::Sad => {
+                        let options = &plan.method.cost;
+                        sad(left, right, x, y, d, i64::from(options.sad_window), i64::from(options.sad_steps))
+                    }
                     MatchingCost::Census => census(),
                     MatchingCost::AdCensus => {
                         let colour = difference(left, x, right, x - d, y, |level| level / 256).min(64);
@@ -58,8 +61,8 @@ fn weight(plan: &Plan, image: &Image, x: i64, y: i64) -> i64 {
     if variance >= enough { 48 } else { 48 * variance / enough }
 }
 
-/// Mean over the valid pixels of the window and the three channels, in 8-bit levels, ties up.
-fn sad(left: &Image, right: &Image, x: i64, y: i64, d: i64, window: i64) -> i64 {
+/// Mean over the valid pixels of the window and the three channels, in `steps` per 8-bit level, ties up.
+fn sad(left: &Image, right: &Image, x: i64, y: i64, d: i64, window: i64, steps: i64) -> i64 {
     let radius = window / 2;
     let (mut sum, mut places) = (0, 0);
     for j in -radius..=radius {
@@ -71,7 +74,7 @@ fn sad(left: &Image, right: &Image, x: i64, y: i64, d: i64, window: i64) -> i64 
         }
     }
     let per_level = 768 * places;
-    ((2 * sum + per_level) / (2 * per_level)).min(i64::from(COST_MAX))
+    ((2 * steps * sum + per_level) / (2 * per_level)).min(i64::from(COST_MAX))
 }
 
 fn usable(image: &Image, x: i64, y: i64) -> bool {

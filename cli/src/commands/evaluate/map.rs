@@ -41,7 +41,7 @@ pub(crate) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    let SceneArgs { json, truth_scale, reading } = &args.scenes;
+    let SceneArgs { json, truth_scale, truth_rounded, reading } = &args.scenes;
     let json = json.as_deref();
     let begun = args.report.begin(json)?;
     let inputs = [Some(&args.map), Some(&args.truth), args.mask.as_ref()];
@@ -50,6 +50,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let estimate = disparity(reader, &args.map, args.scale)?;
     let (map, mask) = (&args.map, args.mask.as_deref());
     let ground = folder::ground_truth(reader, &args.truth, *truth_scale, mask, map, estimate.size())?;
+    let ground = if *truth_rounded { ground.rounded() } else { ground };
     if is_negated(&estimate, ground.truth()) {
         let [map, truth] = [map, &args.truth].map(|path| path.display());
         console::say(&format!("warning: {map} and {truth} seem to use opposite signs: negate one of them"));

@@ -38,7 +38,7 @@ pub(super) struct ReportArgs {
     /// Writes a page with all figures and pictures (index.html), and the pictures as PNG files
     ///
     /// For each pair it shows the left view, its texture zones, disparity and ground truth in the same colours, the signed error (estimate
-    /// minus truth), confidence and validity; for a finished map only the maps. The page needs no other files and no network. An existing
+    /// minus truth), the disparity before post-processing and its error, confidence and validity; for a finished map only the maps. The page needs no other files and no network. An existing
     /// folder must be empty or contain only an earlier report (its index.html names mrfgs as its generator), which is replaced.
     #[arg(long, value_name = "FOLDER")]
     report: Option<PathBuf>,
@@ -126,8 +126,15 @@ pub(super) fn pictures(
         "Estimate minus truth, -{ERROR_LIMIT} to {ERROR_LIMIT} px and beyond. Blue: too far, red: too near, grey: \
          truth unknown, black: no estimate."
     );
-    add("error", "Signed error", alt, legend, &colour::error(estimate, truth, ERROR_LIMIT))?;
+    add("error", "Signed error", alt, legend.clone(), &colour::error(estimate, truth, ERROR_LIMIT))?;
     if let Some((_, maps)) = matched {
+        let raw = maps.raw_map();
+        let picture = colour::preview(&raw, min, max, ColourMap::default());
+        let alt_of_map = format!("estimated disparity before post-processing, {scale}");
+        let scale = format!("{scale}; black: none. The same scale as the truth.");
+        add("raw", "Raw disparity", &alt_of_map, format!("Before post-processing, {scale}"), &picture)?;
+        let alt = format!("{alt}, before post-processing");
+        add("raw-error", "Raw signed error", &alt, legend, &colour::error(&raw, truth, ERROR_LIMIT))?;
         let alt = "confidence of every pixel, bright is sure";
         let legend = "How sure each pixel is, 0 to 255; bright is sure. It is how much worse the second-best disparity fits (in 1/8 nat), averaged over neighbouring pixels.";
         add("confidence", "Confidence", alt, legend.into(), &colour::grey(&maps.confidence))?;

@@ -29,6 +29,9 @@ pub(super) struct SceneArgs {
     /// third size.
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = scale)]
     pub(super) truth_scale: Option<f32>,
+    /// Rounds the ground truth to whole pixels, as programs have it that divide an 8-bit map by its scale in integers
+    #[arg(long)]
+    pub(super) truth_rounded: bool,
     #[command(flatten)]
     pub(super) reading: ReadingArgs,
 }
@@ -92,7 +95,7 @@ impl RunArgs {
         files::check_json(self.json(), read)?;
         let folders = self.folders(dirs)?;
         let mut matcher = Matcher::builder().execution(execution).build()?;
-        let SceneArgs { reading, truth_scale, .. } = &self.scenes;
+        let SceneArgs { reading, truth_scale, truth_rounded, .. } = &self.scenes;
         let mut pairs = Vec::new();
         let mut ran_on = None;
         for folder in folders {
@@ -101,6 +104,9 @@ impl RunArgs {
             if let Some(points) = self.prior_from_truth {
                 let (sampled, rest) = points.sample(&scene.ground, self.prior_seed)?;
                 (prior, scene.ground) = (Some(sampled), rest);
+            }
+            if *truth_rounded {
+                scene.ground = scene.ground.rounded();
             }
             let (pair, name) = (&scene.pair, Some(scene.name.as_str()));
             let searched = SearchSpace::from(scene.range).with_prior(prior.as_ref());

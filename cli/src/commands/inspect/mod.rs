@@ -30,8 +30,8 @@ Examples:
 ///
 /// Times come from the device's own clock if it has one. `rest` is all other time: with DIR, mostly that of the pictures.
 ///
-/// DIR gets pictures and small tables: corrected images, zones, sparse matches, label ranges, costs, graphs, a map per level, and the
-/// change per iteration. With DIR a match takes several times as long and must fit into --memory without tiles.
+/// DIR gets pictures and small tables: corrected images, zones, sparse matches, label ranges, costs, graphs, a map per level (also as PFM,
+/// in pixels of the level), and the change per iteration. With DIR a match takes several times as long and must fit into --memory without tiles.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {

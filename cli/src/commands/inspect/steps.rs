@@ -142,7 +142,7 @@ impl Steps {
         Ok(())
     }
 
-    /// Writes the map of every level, and the entropy of the finest beliefs.
+    /// Writes the map of every level, as a picture and in pixels of the level, and the entropy of the finest beliefs.
     fn levels(&self, backend: &mut dyn Backend) -> Result<()> {
         for (z, level) in self.plan.levels.iter().enumerate() {
             let belief = backend.probe().read(Volume::Belief(z))?;
@@ -151,6 +151,7 @@ impl Steps {
                 (level.min + optima[y * level.width + x] as i32) as f32
             });
             self.map(&format!("map-level-{z}"), &map, level.min as f32, level.max() as f32)?;
+            map.save(self.path(&format!("map-level-{z}.pfm")))?;
             if z == 0 {
                 let entropies: Vec<f32> = belief.chunks_exact(level.labels).map(entropy).collect();
                 let picture = Plane::new(level.width, level.height, entropies);

@@ -20,7 +20,7 @@ use std::ops::Range;
 const SAD_RUN: u32 = 8;
 
 shader! {
-    "cost"(plan, level) { outside_cost: u32, colour_weight: u32, colour_variance: u32, sad_radius: i32 }
+    "cost"(plan, level) { outside_cost: u32, colour_weight: u32, colour_variance: u32, sad_radius: i32, sad_steps: u32 }
     sad { left around radius(plan), right around radius(plan), cost } if plan.method.cost.matching == MatchingCost::Sad => {
         let (window, run) = (plan.method.cost.sad_window as usize, SAD_RUN as usize);
         variant((window + run - 1) * (1 + 5 * window + run) + run * 5)
@@ -63,6 +63,7 @@ impl Uniform {
             colour_weight: plan.colour_weight(),
             colour_variance: plan.colour_variance(),
             sad_radius: radius(plan) as i32,
+            sad_steps: plan.method.cost.sad_steps,
         }
     }
 }

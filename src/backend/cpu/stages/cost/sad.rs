@@ -208,6 +208,8 @@ fn cost_block(views: &Views, at: usize, columns: &[Sum], margin: usize, means: &
 struct Means {
     /// 2^32 / 3 n, rounded up, for each number n of pixel pairs; 0 for n = 0.
     reciprocals: Vec<u32>,
+    /// Steps per 8-bit level.
+    steps: u32,
     /// The cost of labels outside the right image.
     outside: u8,
     padding: Vec<u8>,
@@ -221,15 +223,17 @@ impl Means {
             reciprocals: (0..=most)
                 .map(|n| if n == 0 { 0 } else { (1u64 << 32).div_ceil(3 * n) as u32 })
                 .collect(),
+            steps: plan.method.cost.sad_steps,
             outside: plan.outside_cost,
             padding: padding(level.labels, level.stride),
         }
     }
 
-    /// The mean differences, in 8-bit levels, at most [`COST_MAX`].
+    /// The mean differences, in steps, at most [`COST_MAX`].
     #[inline(always)]
     fn of(&self, sum: &Sum) -> Block<u16> {
-        let (pairs, differences) = (&sum.pairs, &sum.differences);
+        let pairs = &sum.pairs;
+        let differences: Block<u32> = each_lane(|i| sum.differences[i] * self.steps);
         // Usually all labels have the same number of pairs, and the reciprocal is constant.
         let first = pairs[0];
         if *pairs == [first; LABEL_BLOCK] {
@@ -242,7 +246,8 @@ impl Means {
 }
 
 /// round(`sum` / 768 `pairs`), at most [`COST_MAX`], by the upper half of a product. It is exact: up to 961
-/// pairs and a quotient of 255, the error of the reciprocal adds up to less than 1 / 3 n.
+/// pairs and a quotient of 255, the error of the reciprocal adds up to less than 1 / 3 n. Sums of 961 pairs times
+/// 16 steps fit in 32 bits.
 #[inline(always)]
 fn mean(sum: u32, pairs: u16, reciprocal: u32) -> u16 {
     const MOST: u32 = COST_MAX as u32 + 1;
