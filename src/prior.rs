@@ -68,7 +68,8 @@ pub struct PriorUse {
     pub given: usize,
     /// Number of these that their neighbours contradict; they were dropped.
     pub dropped: usize,
-    /// How well the images agree with it, 0.0 ..= 1.0. Its weight is multiplied by this.
+    /// How well the images agree with it, 0.0 ..= 1.0, on average over its pixels. Where they contradict it, nothing of it is used, and
+    /// where they do so in part, its standard deviation is larger. Below a half it is 0, and the prior is not used at all.
     pub trust: f64,
 }
 

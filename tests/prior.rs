@@ -71,7 +71,8 @@ fn points_help_where_matches_say_little() {
         let with = matched(&mut cpu(), &pair, &Method::default(), Some(&prior));
         let (before, after) = (wrong(&without.maps, &truth), wrong(&with.maps, &truth));
         assert!(after < most * before, "{name}: {before} %, then {after} %");
-        assert_eq!((used(&with).trust, used(&with).given), (1.0, prior.count()), "{name}");
+        assert_eq!(used(&with).given, prior.count(), "{name}");
+        assert!(used(&with).trust > 0.9, "{name}: {}", used(&with).trust);
         // Some pixels were decided by the prior, and say so.
         assert!(with.maps.validity.data().contains(&flag::FILLED), "{name}");
         assert!(!without.maps.validity.data().contains(&flag::FILLED), "{name}");

@@ -121,6 +121,9 @@ pub(crate) fn run(
     Ok((matched, time))
 }
 
+/// The trust in a prior from which on it goes without a warning.
+const TRUSTED: f64 = 0.9;
+
 /// Prints what became of a prior, with a warning where the images contradict it.
 fn say_prior(name: &str, used: PriorUse) {
     let PriorUse { kind, given, dropped, trust } = used;
@@ -130,7 +133,7 @@ fn say_prior(name: &str, used: PriorUse) {
     };
     let warning = match trust {
         0.0 => "; warning: the images contradict it, so it was not used: is it of this scene, in pixels of disparity?".into(),
-        1.0 => String::new(),
+        _ if trust >= TRUSTED => String::new(),
         _ => format!("; warning: the images contradict it in part, so it counts {:.0} %", 100.0 * trust),
     };
     console::say(&format!("{name}{text}{warning}"));

@@ -76,7 +76,7 @@ class Matched:
     @property
     def validity(self) -> npt.NDArray[np.uint8]:
         """The status of each pixel: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low confidence, 16
-        filled, 32 masked, 64 a tie of two disparities, 128 outvoted by neighbouring pixels; 0 is measured and trusted."""
+        filled (alone: a prior gave it), 32 masked, 64 a tie of two disparities, 128 outvoted by neighbouring pixels; 0 is measured and trusted."""
     @property
     def right(self) -> npt.NDArray[np.float32] | None:
         """Disparity of the right view in pixels, +inf if unknown: right (x, y) with disparity d appears at left (x + d, y). None without

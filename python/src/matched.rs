@@ -24,7 +24,7 @@ pub(crate) struct PyMatched {
     /// +inf for pixels without a measurement.
     pub(crate) sigma: Py<PyArray2<f32>>,
     /// The status of each pixel, uint8: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low confidence, 16
-    /// filled, 32 masked, 64 a tie of two disparities, 128 outvoted by neighbouring pixels; 0 is measured and trusted.
+    /// filled (alone: a prior gave it), 32 masked, 64 a tie of two disparities, 128 outvoted by neighbouring pixels; 0 is measured and trusted.
     pub(crate) validity: Py<PyArray2<u8>>,
     /// Disparity of the right view in pixels, float32, +inf if unknown: right (x, y) with disparity d appears at left (x + d, y). None
     /// without the option "right-map".

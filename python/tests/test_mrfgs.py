@@ -169,6 +169,38 @@ class Match(unittest.TestCase):
         self.assertFalse(np.array_equal(matched.disparity, by_program(*pair(seed=2), "--max-disparity", "15")))
         self.assertFalse(np.array_equal(matched.disparity, by_program(left, right, "--max-disparity", "15", "--set", "fill=none")))
 
+    def test_priors(self):
+        left, right = pair()
+        # The middle rows are plain, and so say nothing of themselves.
+        left[20:40], right[20:40] = 128, 128
+        known = np.full(left.shape[:2], np.nan, np.float32)
+        known[2::6, 2::6] = np.where(np.arange(60) < 30, 4, 9)[2::6, None]
+        rows, columns = np.nonzero(np.isfinite(known))
+        points = np.column_stack([columns, rows, known[rows, columns]])
+
+        def found(**keywords):
+            return mrfgs.match(left, right, 15, device="cpu", warn=False, **keywords)
+
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "points.csv"
+            np.savetxt(path, points, "%g", ",")
+            expected = by_program(left, right, "--max-disparity", "15", "--prior", path)
+        self.assertTrue(np.array_equal(found(prior=points).disparity, expected))
+        self.assertTrue(np.array_equal(found(prior=known).disparity, expected))
+        sigmas = np.column_stack([points, np.full(len(points), 0.25)])
+        self.assertTrue(np.array_equal(found(prior=sigmas).disparity, expected))
+        self.assertLess(np.mean(np.abs(expected[20:40] - np.where(np.arange(20, 40) < 30, 4, 9)[:, None]) > 1), 0.1)
+        self.assertIn(16, found(prior=points).validity)
+        # Control: without it, or as a surface, the map is another.
+        self.assertFalse(np.array_equal(found().disparity, expected))
+        self.assertFalse(np.array_equal(found(prior=known, prior_kind="surface", prior_sigma=2).disparity, expected))
+        for keywords, word in (({"prior": known[:9]}, "shape"), ({"prior_sigma": 1}, "give a prior"), ({"prior": points, "prior_sigma": -1}, "-1 px"),
+                               ({"prior": points + 900}, "none of the")):
+            with self.assertRaisesRegex(ValueError, word):
+                found(**keywords)
+        with self.assertRaisesRegex(TypeError, "prior_kind"):
+            found(prior=known, prior_kind="dots")
+
     def test_kinds_of_images(self):
         left, right = pair()
         self.same(left[..., 0].copy(), right[..., 0].copy())

@@ -16,8 +16,6 @@ pub(crate) use levels::{anchors, levels};
 pub(crate) struct ReadyPrior {
     /// Known disparities, spread if they were points.
     pub(crate) known: Prior,
-    /// The weight of the prior, in 1/256.
-    pub(crate) weight: u32,
     /// What became of the prior.
     pub(crate) used: PriorUse,
 }
@@ -25,23 +23,17 @@ pub(crate) struct ReadyPrior {
 impl ReadyPrior {
     /// A `prior` for `pair`, which is matched over `range`, at the size of the pair.
     pub(crate) fn new(prior: &Prior, pair: &Pair, range: DisparityRange) -> Self {
-        let given = prior.count();
-        let (known, kept) = match prior.kind {
-            PriorKind::Points => {
-                let points = points::cleaned(prior);
-                let kept = points.count();
-                (points, kept)
-            }
-            PriorKind::Surface => (prior.clone(), given),
-        };
-        let weight = trust::weight(&known, pair, range);
-        let known = if known.kind == PriorKind::Points { points::spread(&known, pair.left()) } else { known };
-        let trust = f64::from(weight) / 256.0;
-        Self { known, weight, used: PriorUse { kind: prior.kind, given, dropped: given - kept, trust } }
+        let points = prior.kind == PriorKind::Points;
+        let cleaned = if points { points::cleaned(prior) } else { prior.clone() };
+        let (known, trust) = trust::weighed(&cleaned, pair, range);
+        let (given, kept) = (prior.count(), cleaned.count());
+        let known = if points { points::spread(&known, pair.left()) } else { known };
+        let trust = f64::from(trust) / 256.0;
+        Self { known, used: PriorUse { kind: prior.kind, given, dropped: given - kept, trust } }
     }
 
     /// The same with other known disparities.
     pub(crate) fn with(&self, known: Prior) -> Self {
-        Self { known, ..self.clone() }
+        Self { known, used: self.used }
     }
 }

@@ -10,7 +10,7 @@ use crate::stage::prior::{LabelPrior, LevelPriors};
 use crate::threads::prelude::*;
 
 /// The largest cost of a prior, in units: 5 nats for points, 2 for a surface, which may be wrong in whole regions.
-const CAPS: [u32; 2] = [20, 8];
+const CAPS: [u8; 2] = [20, 8];
 /// A deviation from a point that costs nothing, in 1/256 px. A surface has its standard deviation in the place of this.
 const POINT_DEAD: i32 = FRACTION / 2;
 /// The largest standard deviation with which a prior decides where no match can be trusted, in 1/256 px.
@@ -29,7 +29,7 @@ pub(crate) fn levels(ready: &ReadyPrior, plan: &Plan) -> LevelPriors {
 /// The prior of the labels of level 0: nothing is known of pixels whose disparity is more than a label outside the range.
 fn finest(ready: &ReadyPrior, level: &LevelPlan) -> Plane<LabelPrior> {
     let known = &ready.known;
-    let most = (CAPS[usize::from(known.kind == PriorKind::Surface)] * ready.weight + 128) >> 8;
+    let cap = CAPS[usize::from(known.kind == PriorKind::Surface)];
     let (low, high) = (level.min - 1, level.max() + 1);
     let mut finest = Plane::filled(level.width, level.height, LabelPrior::default());
     let pixels = finest.data_mut().par_iter_mut().zip(known.disparity.data()).zip(known.sigma.data());
@@ -46,7 +46,7 @@ fn finest(ready: &ReadyPrior, level: &LevelPlan) -> Plane<LabelPrior> {
             slope: ((UNITS_PER_NAT as u32 * FRACTION as u32) << PRIOR_SLOPE_BITS)
                 .div_ceil(sigma.into())
                 .min(PRIOR_SLOPE_MOST),
-            cap: most as u8,
+            cap,
         };
     });
     finest
@@ -87,9 +87,8 @@ fn coarser(fine: &Plane<LabelPrior>, level: &LevelPlan, offset: i32) -> Plane<La
 pub(crate) fn anchors(ready: &ReadyPrior) -> Plane<i32> {
     let known = &ready.known;
     let (width, height) = known.size();
-    let decides = known.kind == PriorKind::Points && ready.weight > 128;
     let mut anchors = Plane::filled(width, height, NO_ANCHOR);
-    if decides {
+    if known.kind == PriorKind::Points {
         let pixels = anchors.data_mut().iter_mut().zip(known.disparity.data()).zip(known.sigma.data());
         let trusted = pixels.filter(|(_, sigma)| (1..=ANCHOR_SIGMA).contains(*sigma));
         trusted.for_each(|((anchor, &disparity), _)| *anchor = disparity);

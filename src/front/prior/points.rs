@@ -24,8 +24,8 @@ const MOST: f64 = 4096.0;
 const NEAR_MEDIAN: i64 = FRACTION as i64;
 /// Largest deviation that counts for the standard deviation, in 1/256 px.
 const SPREAD_MOST: i64 = 8 * FRACTION as i64;
-/// Standard deviation of a pixel whose points agree perfectly and lie close, in 1/256 px.
-const SIGMA: i64 = FRACTION as i64 / 2;
+/// What the standard deviation of a pixel exceeds that of its points by, if these agree perfectly and lie close, in 1/256 px.
+const SIGMA: i64 = FRACTION as i64 / 4;
 /// Growth of the standard deviation with the distance of the points, in 1/256 px per px.
 const GROWTH: i64 = 38;
 /// Pixels with a larger standard deviation remain unknown, in 1/256 px.
@@ -66,7 +66,7 @@ pub(super) fn cleaned(prior: &Prior) -> Prior {
 ///
 /// A plane is fitted through each point and its neighbours. For a pixel, the nearest points in all directions predict a disparity, each by its plane,
 /// with weights that fall with distance and with the difference of colour. The disparity is the mean of the predictions close
-/// to their weighted median. The standard deviation grows with their deviations from that and with their distance.
+/// to their weighted median. The standard deviation is that of the points, and grows with their deviations from that and with their distance.
 pub(super) fn spread(prior: &Prior, left: &Image) -> Prior {
     let points = Points::new(prior);
     let colours = smoothed(left);
@@ -110,13 +110,14 @@ pub(super) fn spread(prior: &Prior, left: &Image) -> Prior {
 struct Points {
     places: Vec<(i32, i32)>,
     disparity: Vec<i32>,
+    sigma: Vec<u16>,
 }
 
 impl Points {
     fn new(prior: &Prior) -> Self {
-        let (places, disparity) =
-            prior.known().map(|((x, y), disparity, _)| ((x as i32, y as i32), disparity)).unzip();
-        Self { places, disparity }
+        let places = prior.known().map(|((x, y), ..)| (x as i32, y as i32)).collect();
+        let (disparity, sigma) = prior.known().map(|(_, disparity, sigma)| (disparity, sigma)).unzip();
+        Self { places, disparity, sigma }
     }
 
     /// The slopes along x and y of the plane through point `i` that fits its neighbours best.
@@ -161,7 +162,7 @@ impl Points {
         let scale = scale(near);
         // (prediction, weight, distance), by prediction.
         let mut each = [(0_i64, 0_i64, 0_i64); COUNT];
-        let (mut count, mut sum) = (0, 0);
+        let (mut count, mut sum, mut own_sigma) = (0, 0, 0);
         for &(_, j) in near {
             let (px, py) = self.places[j as usize];
             let (dx, dy) = (at.0 as i64 - i64::from(px), at.1 as i64 - i64::from(py));
@@ -173,6 +174,7 @@ impl Points {
             each.copy_within(place..count.min(COUNT - 1), place + 1);
             each[place] = (prediction, weight, away);
             (count, sum) = (count + 1, sum + weight);
+            own_sigma += weight * i64::from(self.sigma[j as usize]);
         }
         let each = &each[..count];
         let mut below = 0;
@@ -190,7 +192,7 @@ impl Points {
             deviation += weight * off.abs().min(SPREAD_MOST);
             away += weight * distance;
         }
-        let sigma = SIGMA + deviation / sum + GROWTH * away / (sum * STEPS);
+        let sigma = SIGMA + own_sigma / sum + deviation / sum + GROWTH * away / (sum * STEPS);
         (sigma <= SIGMA_MOST).then(|| ((median + mean / inside.max(1)) as i32, sigma as u16))
     }
 }

@@ -13,7 +13,7 @@ use crate::threads::prelude::*;
 /// The largest number of samples.
 const SAMPLES: usize = 4096;
 /// With fewer samples, the prior is trusted.
-const FEW: usize = 16;
+const FEW: u64 = 16;
 /// Number of other disparities per sample.
 const OTHERS: i32 = 16;
 /// Largest difference of matches that counts, in 1/256 levels summed over a window: 32 levels per pixel.
@@ -23,29 +23,86 @@ const RADIUS: i32 = 2;
 /// Largest tolerance of a disparity, in px.
 const MOST_TOLERANCE: i32 = 8;
 /// Share of samples whose match is the best, in 1/256, from which on a prior is trusted fully, and up to which not at all.
-const SHARES: [u64; 2] = [90, 45];
+const SHARES: [u64; 2] = [100, 50];
+/// A prior with a smaller mean trust is wrong as a whole, in 1/256.
+const LEAST_TRUST: u64 = 128;
+/// Number of blocks along the longer side of a view, and their least side in px.
+const BLOCKS: usize = 10;
+const LEAST_SIDE: usize = 32;
+/// The share of the whole view counts in each block like this many samples.
+const SHARED_SAMPLES: u64 = 6;
 
-/// The weight of `known` for `pair`, matched over `range`, in 1/256.
-pub(super) fn weight(known: &Prior, pair: &Pair, range: DisparityRange) -> u32 {
+/// What samples say, squared, and how much of that is said for the prior.
+#[derive(Clone, Copy, Default)]
+struct Votes {
+    says: u64,
+    best: u64,
+    samples: u64,
+}
+
+impl Votes {
+    fn add(&mut self, other: Self) {
+        self.says += other.says;
+        self.best += other.best;
+        self.samples += other.samples;
+    }
+}
+
+/// Drops what the images contradict in `known`, and divides standard deviations by the trust where it is less than full. Trust is found
+/// for blocks of the view, each with those around it, because a prior may be wrong in part. Returns the mean trust, in 1/256; at less than a half, the prior is dropped.
+pub(super) fn weighed(known: &Prior, pair: &Pair, range: DisparityRange) -> (Prior, u32) {
+    let (width, height) = known.size();
+    let side = width.max(height).div_ceil(BLOCKS).max(LEAST_SIDE);
+    let (columns, rows) = (width.div_ceil(side), height.div_ceil(side));
     let all = known.count();
     let every = all.div_ceil(SAMPLES).max(1);
     let samples: Vec<_> = known.known().step_by(every).collect();
-    let found: Vec<_> = samples.par_iter().filter_map(|&sample| compared(sample, pair, range)).collect();
-    let says: u64 = found.iter().map(|(says, _)| says).sum();
-    let best: u64 = found.iter().filter(|(_, is_best)| *is_best).map(|(says, _)| says).sum();
-    if found.len() < FEW || says == 0 {
-        return 256;
+    let found: Vec<_> = samples.par_iter().map(|&sample| compared(sample, pair, range)).collect();
+    let mut blocks = vec![Votes::default(); columns * rows];
+    let mut whole = Votes::default();
+    for (((x, y), ..), votes) in samples.iter().zip(found) {
+        if let Some(votes) = votes {
+            blocks[y / side * columns + x / side].add(votes);
+            whole.add(votes);
+        }
     }
-    let [full, none] = SHARES;
-    (256 * (256 * best / says).saturating_sub(none).min(full - none) / (full - none)) as u32
+    if whole.samples < FEW || whole.says == 0 {
+        return (known.clone(), 256);
+    }
+    let trust = |column: usize, row: usize| {
+        let says = SHARED_SAMPLES * whole.says / whole.samples;
+        let best = SHARED_SAMPLES * whole.best / whole.samples;
+        let mut votes = Votes { says, best, samples: 0 };
+        for v in row.saturating_sub(1)..(row + 2).min(rows) {
+            for u in column.saturating_sub(1)..(column + 2).min(columns) {
+                votes.add(blocks[v * columns + u]);
+            }
+        }
+        let [full, none] = SHARES;
+        256 * (256 * votes.best / votes.says.max(1)).saturating_sub(none).min(full - none) / (full - none)
+    };
+    let trusts: Vec<u64> = (0..columns * rows).map(|i| trust(i % columns, i / columns)).collect();
+    let (mut weighed, mut sum) = (known.clone(), 0);
+    for ((x, y), _, sigma) in known.known() {
+        let trust = trusts[y / side * columns + x / side];
+        sum += trust;
+        let less = (u64::from(sigma) * 256).checked_div(trust).unwrap_or(0);
+        weighed.sigma[(x, y)] = less.min(u16::MAX.into()) as u16;
+    }
+    let mean = sum / all.max(1) as u64;
+    // On plain surfaces even a prior of little weight would win.
+    if mean < LEAST_TRUST {
+        return (Prior::nothing(known.kind, known.size()), 0);
+    }
+    (weighed, mean as u32)
 }
 
-/// How much the matches of a known pixel differ, squared, and whether that at its disparity is the best.
+/// What a known pixel says.
 fn compared(
     ((x, y), disparity, sigma): ((usize, usize), i32, u16),
     pair: &Pair,
     range: DisparityRange,
-) -> Option<(u64, bool)> {
+) -> Option<Votes> {
     let own = (disparity + FRACTION / 2).div_euclid(FRACTION);
     let tolerance = (1 + i32::from(sigma) / FRACTION).min(MOST_TOLERANCE);
     let around = |d: i32| d - tolerance..=d + tolerance;
@@ -56,7 +113,8 @@ fn compared(
     let far = others.filter(|d| (d - own).abs() > 2 * tolerance).filter_map(cost);
     let (least, most) = far.fold((u32::MAX, 0), |(least, most), cost| (least.min(cost), most.max(cost)));
     let says = u64::from((most.max(own_cost).checked_sub(least.min(own_cost))?).min(DIFFER_MOST) / 256);
-    (most > 0).then_some((says * says, own_cost < least))
+    let best = if own_cost < least { says * says } else { 0 };
+    (most > 0).then_some(Votes { says: says * says, best, samples: 1 })
 }
 
 /// The sum of absolute differences of the windows around a left pixel and its match at disparity `d`, each less its mean; `None`
