@@ -368,7 +368,7 @@ fn no_data_pixels_are_masked() {
     let tag = (42_113, Text("3"));
     assert_eq!(colours(&rgb([2, 1], &[tag], &[&[3, 3, 3, 3, 3, 4]])), [None, Some([3, 3, 4])]);
     assert_eq!(greys(&grey([2, 1], &[(262, Short(&[0])), tag], &[&[3, 252]])), [None, Some(3)]);
-    refused(&grey([1, 1], &[(42_113, Text("none"))], &[&[1]]), &["no-data value `none`", "no number"]);
+    refused(&grey([1, 1], &[(42_113, Text("none"))], &[&[1]]), &["no-data value `none`", "not a number"]);
 }
 
 #[test]
