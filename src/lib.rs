@@ -78,7 +78,7 @@
 //! - [`check`] warns of likely faults of a pair, and finds its disparity range.
 //! - [`calibration`] reads the calibrations of cameras, and [`rectification`] rectifies their images.
 //! - [`drift`] finds how the cameras of a rig have turned since they were calibrated, from their frames.
-//! - [`prior`] tells a match what is known of the scene: points of a LiDAR, a terrain model.
+//! - [`prior`] tells a match what is known of the scene: points of a lidar, a terrain model.
 //! - [`region`] matches a region of the left view alone.
 //! - [`steady`] smooths the maps of a video over time where the scene is static.
 //! - [`depth`] turns disparities into depths and points, for calibrated cameras.

@@ -3,7 +3,7 @@
 //! A [`Prior`] belongs to a single match: see [`Job::prior`](crate::Job::prior). It holds for the left view. Its disparities, each
 //! with a standard deviation, enter the factor graph as a unary factor of every level, in addition to the evidence of the images.
 //!
-//! - Points ([`Prior::points`]) are exact but sparse: of a LiDAR, a depth sensor or a bundle adjustment. Those that their neighbours
+//! - Points ([`Prior::points`]) are exact but sparse: of a lidar, a depth sensor or a bundle adjustment. Those that their neighbours
 //!   contradict are dropped. The others are spread to the pixels around them, by distance and colour, and where no match can be
 //!   trusted they decide.
 //! - A surface ([`Prior::map`]) is dense but coarse: a terrain model, the depth map of a phone, or the map of the last frame.

@@ -52,20 +52,20 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// What a LiDAR beside the left camera measures: lines of `x,y,disparity`, a point at every fifth pixel of every twelfth row, with
+    /// What a lidar beside the left camera measures: lines of `x,y,disparity`, a point at every fifth pixel of every twelfth row, with
     /// errors of up to a quarter of a pixel. Every 23rd point has a wrong disparity.
     pub fn lidar(&self) -> String {
         let (width, height) = self.truth.size();
         let places = (6..height).step_by(12).flat_map(|y| (2..width).step_by(5).map(move |x| (x, y)));
-        let mut lines = String::from("x,y,disparity\n");
-        for (i, (x, y)) in (0_u32..).zip(places) {
+        let line = |(i, (x, y)): (u32, (usize, usize))| {
             // Between 0 and 1.
             let random = f64::from(i.wrapping_mul(0x9e37_79b9) >> 12) / f64::from(1 << 20);
             let truth = f64::from(self.truth[(x, y)]);
             let disparity = if i % 23 == 9 { random * 31.0 } else { truth + 0.5 * (random - 0.5) };
-            lines += &format!("{x},{y},{disparity:.2}\n");
-        }
-        lines
+            format!("{x},{y},{disparity:.2}")
+        };
+        let lines: Vec<String> = (0_u32..).zip(places).map(line).collect();
+        format!("x,y,disparity\n{}\n", lines.join("\n"))
     }
 
     /// The content of `calib.txt`: cameras, baseline in metres, and number of labels.

@@ -95,7 +95,7 @@ fn a_coarse_surface_helps() {
 fn outliers_are_dropped() {
     let (pair, truth) = scene("mixed");
     // Every fifth point is wrong.
-    let is_wrong = |x: usize, y: usize| (x / 8 + 3 * (y / 8)) % 5 == 0;
+    let is_wrong = |x: usize, y: usize| (x / 8 + 3 * (y / 8)).is_multiple_of(5);
     let change =
         |x: usize, y: usize, d: f32| if is_wrong(x, y) { ((x * 31 + y * 17) % 47) as f32 } else { d };
     let prior = Arc::new(Prior::map(PriorKind::Points, &sampled(&truth, 8, change), 0.25).unwrap());

@@ -29,7 +29,7 @@ pub(crate) enum Kind {
 #[derive(clap::Args)]
 #[command(next_help_heading = "What is known of the scene")]
 pub(crate) struct PriorArgs {
-    /// Disparities of LEFT that are known: points of a LiDAR or of a bundle adjustment, a terrain model, the map of the last frame
+    /// Disparities of LEFT that are known: points of a lidar or of a bundle adjustment, a terrain model, the map of the last frame
     ///
     /// Either a disparity map of the size of LEFT (PFM, TIFF, PNG as in KITTI, NPY; 0 of a PNG, infinity and NaN are unknown), or a .csv or
     /// .txt file with a line `x,y,disparity` or `x,y,disparity,sigma` for each point, in pixels. With --rectify, they belong to the rectified view.

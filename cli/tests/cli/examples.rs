@@ -21,6 +21,10 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("scripts/recordings --example drive.mcap", "installs Python packages"),
     ("export PKG_CONFIG_PATH=~/.local/lib/pkgconfig LD_LIBRARY_PATH=~/.local/lib", "scripts/c tries it"),
     ("cc video.c $(pkg-config --cflags --libs mrfgs)", "scripts/c tries it"),
+    (
+        "matched = mrfgs.match(left, right, 63, prior=points)                    # shape (n, 3) or (n, 4)",
+        "Python; its tests try it",
+    ),
     // These need other programs.
     (
         "ffmpeg -i stereo.mkv -pix_fmt yuv444p -f yuv4mpegpipe - | mrfgs sequence - - --method fast --max-disparity 63 | ffplay -",

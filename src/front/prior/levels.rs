@@ -60,7 +60,7 @@ fn coarser(fine: &Plane<LabelPrior>, level: &LevelPlan, offset: i32) -> Plane<La
     let mut coarse = Plane::filled(level.width, level.height, LabelPrior::default());
     coarse.data_mut().par_chunks_mut(level.width).enumerate().for_each(|(y, row)| {
         for (x, out) in row.iter_mut().enumerate() {
-            let (mut lo, mut hi, mut slope, mut cap, mut count) = (i32::MAX, i32::MIN, 0, 0, 0);
+            let (mut lo, mut hi, mut slope, mut cap, mut count) = (i32::MAX, i32::MIN, 0, 0, 0_u32);
             for v in 2 * y..(2 * y + 2).min(height) {
                 for child in &fine.row(v)[2 * x..(2 * x + 2).min(width)] {
                     if child.cap > 0 {
@@ -69,15 +69,14 @@ fn coarser(fine: &Plane<LabelPrior>, level: &LevelPlan, offset: i32) -> Plane<La
                     }
                 }
             }
-            if count > 0 {
-                let shift = offset * LabelPrior::LABEL;
-                *out = LabelPrior {
-                    lo: (lo - shift - LabelPrior::LABEL).div_euclid(2),
-                    hi: -(-(hi - shift + LabelPrior::LABEL)).div_euclid(2),
-                    slope: (2 * slope / count).min(PRIOR_SLOPE_MOST),
-                    cap: (cap / count) as u8,
-                };
-            }
+            let Some(slope) = (2 * slope).checked_div(count) else { continue };
+            let shift = offset * LabelPrior::LABEL;
+            *out = LabelPrior {
+                lo: (lo - shift - LabelPrior::LABEL).div_euclid(2),
+                hi: -(-(hi - shift + LabelPrior::LABEL)).div_euclid(2),
+                slope: slope.min(PRIOR_SLOPE_MOST),
+                cap: (cap / count) as u8,
+            };
         }
     });
     coarse

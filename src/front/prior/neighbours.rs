@@ -29,7 +29,9 @@ impl<'a> Neighbours<'a> {
         let (columns, rows) = (width as i32 / cell + 1, height as i32 / cell + 1);
         let cell_of = |&(x, y): &(i32, i32)| (y / cell * columns + x / cell) as usize;
         let mut starts = vec![0; (columns * rows) as usize + 1];
-        points.iter().for_each(|point| starts[cell_of(point) + 1] += 1);
+        for point in points {
+            starts[cell_of(point) + 1] += 1;
+        }
         for i in 1..starts.len() {
             starts[i] += starts[i - 1];
         }
@@ -43,7 +45,7 @@ impl<'a> Neighbours<'a> {
         Self { points, cell, columns, rows, starts, order }
     }
 
-    /// The points nearest to (x, y), one in each of eight sectors, because the rows of a LiDAR are much farther apart than their points.
+    /// The points nearest to (x, y), one in each of eight sectors, because the rows of a lidar are much farther apart than their points.
     /// They are at most `reach` px away, and at most [`FARTHEST`] times as far as the third nearest; nearest first, those of lower
     /// index first on ties. The point `but` is left out.
     ///

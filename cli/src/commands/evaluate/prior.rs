@@ -15,7 +15,7 @@ pub(super) struct SampledPoints {
     noise: f64,
     /// Share of the points that have a random disparity.
     outliers: f64,
-    /// Number of image rows that the points lie in, like those of a LiDAR; 0 for all.
+    /// Number of image rows that the points lie in, like those of a lidar; 0 for all.
     rows: usize,
 }
 
@@ -75,7 +75,7 @@ impl SampledPoints {
     }
 }
 
-/// Random numbers that are the same everywhere (SplitMix64).
+/// Random numbers that are the same everywhere (`SplitMix64`).
 struct Random(u64);
 
 impl Random {

@@ -45,7 +45,7 @@ pub(super) struct RunArgs {
     /// Gives each match a prior of points: a share of the known truth, which the figures then leave out
     ///
     /// SHARE is from 0 to 1. The points may have noise (a standard deviation in pixels), a share of outliers with random disparities, and lie
-    /// in evenly spaced rows alone, like those of a LiDAR: 0.01,0.5,0.2,16.
+    /// in evenly spaced rows alone, like those of a lidar: 0.01,0.5,0.2,16.
     #[arg(long, value_name = "SHARE[,NOISE[,OUTLIERS[,ROWS]]]", value_parser = SampledPoints::parse)]
     prior_from_truth: Option<SampledPoints>,
     /// The seed of the sampled points

@@ -37,7 +37,7 @@ Examples:
   mrfgs match l.png r.png d.pfm --focal 700 --baseline 120mm --also depth
   # Both views in one file of a stereo camera:
   mrfgs match photo.mpo d.pfm --rectify
-  # With points of a LiDAR in the left view, as lines of x,y,disparity:
+  # With points of a lidar in the left view, as lines of x,y,disparity:
   mrfgs match l.png r.png d.pfm --max-disparity 90 --prior points.csv
   # Points as LAZ, in the frame of the left camera before rectification:
   mrfgs match l.png r.png d.pfm --rectify --calib c --also points-original.laz";
