@@ -228,13 +228,13 @@ mod tests {
     #[test]
     fn commands_have_few_flags() {
         let caps = [
-            ("match", 29),
+            ("match", 32),
             ("rectify", 9),
             ("depth", 17),
             ("sequence", 36),
             ("ros", 27),
             ("batch", 21),
-            ("evaluate", 12),
+            ("evaluate", 15),
             ("evaluate map", 9),
             ("evaluate submission", 10),
             ("bench", 11),
