@@ -59,7 +59,7 @@ pub struct PriorPoint {
     pub sigma: f64,
 }
 
-/// What became of the prior of a match.
+/// How much of a prior a match has used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PriorUse {
     /// How it was used.

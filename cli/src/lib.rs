@@ -236,7 +236,7 @@ mod tests {
             ("batch", 21),
             ("evaluate", 15),
             ("evaluate map", 10),
-            ("evaluate submission", 13),
+            ("evaluate submission", 11),
             ("bench", 11),
             ("inspect", 16),
             ("presets", 2),

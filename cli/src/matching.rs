@@ -15,7 +15,7 @@ use crate::progress::Bar;
 use crate::remedy;
 use crate::text::plural;
 
-/// The disparities and the region that a match searches.
+/// The disparities that a match searches, in which region, and those that are known before.
 #[derive(Clone, Copy)]
 pub(crate) struct SearchSpace<'a> {
     range: DisparityRange,
@@ -23,7 +23,7 @@ pub(crate) struct SearchSpace<'a> {
     pub(crate) may_widen: bool,
     /// The region of the left view; `None` for all of it.
     region: Option<&'a Rect>,
-    /// What is known of the scene.
+    /// Known disparities of the left view.
     prior: Option<&'a Arc<Prior>>,
 }
 
@@ -49,7 +49,7 @@ impl<'a> SearchSpace<'a> {
         Self { region, ..self }
     }
 
-    /// Adds what is known of the scene, if anything.
+    /// Adds known disparities, if there are any.
     pub(crate) fn with_prior(self, prior: Option<&'a Arc<Prior>>) -> Self {
         Self { prior, ..self }
     }

@@ -1,4 +1,4 @@
-//! What is known of a scene.
+//! The arguments of a prior: known disparities of the left view.
 
 use std::sync::Arc;
 

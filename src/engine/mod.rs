@@ -32,7 +32,7 @@ pub struct Solution {
     pub iterations: u32,
     /// The corrections that were made to the pair.
     pub conditioning: Conditioning,
-    /// What became of the prior, if there was one.
+    /// How much of the prior was used; `None` without one.
     pub prior: Option<PriorUse>,
     /// The host steps around the stages, each with its time.
     pub host_times: Vec<(&'static str, Duration)>,

@@ -22,7 +22,7 @@ pub(super) struct Source {
     pub(super) conditioning: Conditioning,
     /// Whether the pair is at twice its size.
     pub(super) is_double: bool,
-    /// What is known of the scene.
+    /// Known disparities of the left view, prepared for the match.
     prior: Option<ReadyPrior>,
 }
 
@@ -66,7 +66,7 @@ impl Source {
         Ok(())
     }
 
-    /// What is known of the pixels of `frame`, in the labels of its levels.
+    /// The prior of the pixels of `frame`, in the labels of its levels.
     pub(super) fn prior_of(&self, frame: &Frame) -> Option<LevelPriors> {
         let ready = self.prior.as_ref().filter(|_| frame.plan.prior)?;
         if frame.tile.is_none() && !frame.mirrored {
@@ -82,7 +82,7 @@ impl Source {
         self.prior.as_ref().map(front::prior::anchors)
     }
 
-    /// What became of the prior.
+    /// Reports how much of the prior was used.
     pub(super) fn used(&self) -> Option<PriorUse> {
         self.prior.as_ref().map(|ready| ready.used)
     }

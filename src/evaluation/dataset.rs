@@ -23,9 +23,9 @@ impl GroundTruth {
         Ok(Self { truth, mask })
     }
 
-    /// The same ground truth in whole pixels: every known disparity rounded to the nearest, ties away from 0.
+    /// The ground truth with every known disparity rounded to the nearest whole pixel, ties away from 0.
     ///
-    /// A program has it so that divides an 8-bit map by its scale in integers, as MATLAB does with `uint8`.
+    /// Programs that divide an 8-bit map by its scale in integers compare with such a truth: MATLAB does so with `uint8`.
     #[must_use]
     pub fn rounded(&self) -> Self {
         Self { truth: self.truth.map(|d| d.round()), mask: self.mask.clone() }

@@ -12,7 +12,7 @@ pub struct Prepared {
     pub pair: Pair,
     /// First and last label index of each pixel, by level; empty where every label is allowed.
     pub label_ranges: Vec<Plane<[u16; 2]>>,
-    /// What is known of the scene; without it, a plan with a prior takes every label alike.
+    /// The prior of each label. Without it, a plan with a prior takes every label alike.
     pub prior: Option<LevelPriors>,
     /// The source of the label ranges: texture zones and sparse matches.
     #[cfg(feature = "paper")]

@@ -16,7 +16,7 @@ pub(crate) use levels::{anchors, levels};
 pub(crate) struct ReadyPrior {
     /// Known disparities, spread if they were points.
     pub(crate) known: Prior,
-    /// What became of the prior.
+    /// How much of the prior was used.
     pub(crate) used: PriorUse,
 }
 

@@ -24,7 +24,7 @@ pub struct Matched {
     pub iterations: u32,
     /// The corrections that were made to the pair before it was matched.
     pub conditioning: Conditioning,
-    /// What became of the [prior](crate::Job::prior), if there was one.
+    /// How much of the [prior](crate::Job::prior) was used; `None` without one.
     pub prior: Option<PriorUse>,
     /// The plan of the whole image; [`Plan::doubled`] is its plan at twice the size.
     #[doc(hidden)]

@@ -1,4 +1,4 @@
-//! What is known of the scene.
+//! The flags of a prior: known disparities of the left view.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

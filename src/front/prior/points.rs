@@ -64,8 +64,8 @@ pub(super) fn cleaned(prior: &Prior) -> Prior {
 
 /// Spreads the points of `prior` over `left`, the view that they are in.
 ///
-/// A plane is fitted through each point and its neighbours. For a pixel, the nearest points in all directions predict a disparity, each by its plane,
-/// with weights that fall with distance and with the difference of colour. The disparity is the mean of the predictions close
+/// A plane is fitted through each point and its neighbours. For a pixel, the nearest points in all directions predict a disparity, each by
+/// its plane, with weights that fall with distance and with the difference of colour. The disparity is the mean of the predictions close
 /// to their weighted median. The standard deviation is that of the points, and grows with their deviations from that and with their distance.
 pub(super) fn spread(prior: &Prior, left: &Image) -> Prior {
     let points = Points::new(prior);

@@ -32,7 +32,7 @@ const LEAST_SIDE: usize = 32;
 /// The share of the whole view counts in each block like this many samples.
 const SHARED_SAMPLES: u64 = 6;
 
-/// What samples say, squared, and how much of that is said for the prior.
+/// Sums over samples of squared differences of matches: of all samples, and of those whose best match is at the known disparity.
 #[derive(Clone, Copy, Default)]
 struct Votes {
     says: u64,
@@ -49,7 +49,8 @@ impl Votes {
 }
 
 /// Drops what the images contradict in `known`, and divides standard deviations by the trust where it is less than full. Trust is found
-/// for blocks of the view, each with those around it, because a prior may be wrong in part. Returns the mean trust, in 1/256; at less than a half, the prior is dropped.
+/// for blocks of the view, each with those around it, because a prior may be wrong in part. Returns the mean trust, in 1/256. At less than
+/// a half, the whole prior is dropped.
 pub(super) fn weighed(known: &Prior, pair: &Pair, range: DisparityRange) -> (Prior, u32) {
     let (width, height) = known.size();
     let side = width.max(height).div_ceil(BLOCKS).max(LEAST_SIDE);
@@ -97,7 +98,7 @@ pub(super) fn weighed(known: &Prior, pair: &Pair, range: DisparityRange) -> (Pri
     (weighed, mean as u32)
 }
 
-/// What a known pixel says.
+/// Compares the matches of a known pixel. `None` if its windows leave the views.
 fn compared(
     ((x, y), disparity, sigma): ((usize, usize), i32, u16),
     pair: &Pair,

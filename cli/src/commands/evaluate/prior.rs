@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use mrfgs::Prior;
 use mrfgs::evaluation::GroundTruth;
-use mrfgs::prior::PriorPoint;
+use mrfgs::prior::{PriorKind, PriorPoint};
 
 /// Points that are sampled from the ground truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,9 +18,6 @@ pub(super) struct SampledPoints {
     /// Number of image rows that the points lie in, like those of a lidar; 0 for all.
     rows: usize,
 }
-
-/// Smallest standard deviation of a point in px.
-const LEAST_SIGMA: f64 = 0.25;
 
 impl SampledPoints {
     /// Reads `SHARE[,NOISE[,OUTLIERS[,ROWS]]]`.
@@ -40,14 +37,9 @@ impl SampledPoints {
     pub(super) fn sample(self, ground: &GroundTruth, seed: u64) -> mrfgs::Result<(Arc<Prior>, GroundTruth)> {
         let mut truth = ground.truth().clone();
         let (width, height) = truth.size();
-        let known = |truth: f32| truth.is_finite();
-        let (least, most) = truth
-            .data()
-            .iter()
-            .filter(|d| known(**d))
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), &d| {
-                (least.min(d.into()), most.max(d.into()))
-            });
+        let known = truth.data().iter().filter(|d| d.is_finite());
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        let (least, most) = known.fold(ends, |(least, most), &d| (least.min(d.into()), most.max(d.into())));
         let mut random = Random(seed);
         // Evenly spaced rows.
         let is_row = |y: usize| self.rows == 0 || (y + 1) * self.rows / height != y * self.rows / height;
@@ -66,7 +58,7 @@ impl SampledPoints {
                 x: x as f64,
                 y: y as f64,
                 disparity,
-                sigma: self.noise.max(LEAST_SIGMA),
+                sigma: self.noise.max(PriorKind::Points.usual_sigma()),
             });
             truth[(x, y)] = f32::INFINITY;
         }

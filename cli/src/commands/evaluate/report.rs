@@ -38,7 +38,8 @@ pub(super) struct ReportArgs {
     /// Writes a page with all figures and pictures (index.html), and the pictures as PNG files
     ///
     /// For each pair it shows the left view, its texture zones, disparity and ground truth in the same colours, the signed error (estimate
-    /// minus truth), the disparity before post-processing and its error, confidence and validity; for a finished map only the maps. The page needs no other files and no network. An existing
+    /// minus truth), the disparity before post-processing and its error, confidence and validity; for a finished map only the maps. The page
+    /// needs no other files and no network. An existing
     /// folder must be empty or contain only an earlier report (its index.html names mrfgs as its generator), which is replaced.
     #[arg(long, value_name = "FOLDER")]
     report: Option<PathBuf>,

@@ -42,16 +42,6 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     scenes: SceneArgs,
 
-    /// Gives each match a prior of points: a share of the known truth, which the figures then leave out
-    ///
-    /// SHARE is from 0 to 1. The points may have noise (a standard deviation in pixels), a share of outliers with random disparities, and lie
-    /// in evenly spaced rows alone, like those of a lidar: 0.01,0.5,0.2,16.
-    #[arg(long, value_name = "SHARE[,NOISE[,OUTLIERS[,ROWS]]]", value_parser = SampledPoints::parse)]
-    prior_from_truth: Option<SampledPoints>,
-    /// The seed of the sampled points
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "prior_from_truth")]
-    prior_seed: u64,
-
     #[command(flatten)]
     method: MethodArgs,
     #[command(flatten)]
@@ -83,12 +73,13 @@ impl RunArgs {
     }
 
     /// Matches every folder by `method` and passes each pair with its maps and time to `see`. Checks before any computing that the JSON can
-    /// be written and does not overwrite an input.
+    /// be written and does not overwrite an input. With `sampled`, points of the truth by a seed, each match has them as a prior.
     pub(super) fn match_all(
         &self,
         dirs: &[PathBuf],
         method: Method,
         execution: Execution,
+        sampled: Option<(SampledPoints, u64)>,
         mut see: impl FnMut(&Scene, &Maps, Duration) -> Result<()>,
     ) -> Result<Findings> {
         let read = folder::inputs_of(dirs).chain(self.method.files().map(Path::to_owned));
@@ -101,9 +92,9 @@ impl RunArgs {
         for folder in folders {
             let mut scene = folder.read(reading.reader(), *truth_scale)?;
             let mut prior = None;
-            if let Some(points) = self.prior_from_truth {
-                let (sampled, rest) = points.sample(&scene.ground, self.prior_seed)?;
-                (prior, scene.ground) = (Some(sampled), rest);
+            if let Some((points, seed)) = sampled {
+                let (given, rest) = points.sample(&scene.ground, seed)?;
+                (prior, scene.ground) = (Some(given), rest);
             }
             if *truth_rounded {
                 scene.ground = scene.ground.rounded();

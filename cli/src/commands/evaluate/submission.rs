@@ -52,7 +52,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let names = args.dirs.iter().map(|dir| folder::name(dir)).collect::<Vec<_>>();
     let submission = Submission::new(&args.folder, &args.called, &names, method.refinement.fill)?;
     submission.folder.check_json("DIR", args.run.json())?;
-    let findings = args.run.match_all(&args.dirs, method, execution, |scene, maps, time| {
+    let findings = args.run.match_all(&args.dirs, method, execution, None, |scene, maps, time| {
         submission.add(&scene.name, &maps.final_map(), time)
     })?;
     files::deliver(args.run.json(), &findings, &metrics::text(&findings), |written| {
