@@ -6,7 +6,7 @@ use mrfgs::options::{Method, PRESETS, Preset, mebibytes};
 
 use crate::failure::{Failure, Result};
 
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 #[command(next_help_heading = "Method")]
 pub(crate) struct MethodArgs {
     /// A preset, or a TOML file that overrides keys of the preset; `mrfgs presets` lists both. May be repeated: later files override
@@ -67,6 +67,14 @@ impl MethodArgs {
         method.set_all(self.set.iter().map(|(key, value)| (key.as_str(), value.as_str())))?;
         method.tiles.memory = self.memory.unwrap_or(method.tiles.memory);
         Ok(method.validated()?)
+    }
+
+    /// The first method and any others: each preset among the words of `--method` begins one, and files after it override it. Other flags
+    /// apply to all.
+    pub(crate) fn each(&self) -> (Self, Vec<Self>) {
+        let with = |method| Self { method, ..self.clone() };
+        let mut words = self.method.chunk_by(|_, next| preset(next).is_none()).map(<[_]>::to_vec);
+        (with(words.next().unwrap_or_default()), words.map(with).collect())
     }
 
     /// The files among the arguments of `--method`.

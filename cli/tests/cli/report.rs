@@ -117,3 +117,57 @@ fn a_failed_report_leaves_nothing() {
     fs::write(at("site/index.html"), "<!doctype html><title>Home</title>").unwrap();
     refused(&folder, &format!("{line} --report site"), 1, "site & index.html");
 }
+
+#[test]
+fn methods_are_compared_side_by_side() {
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
+    copy("slanted", &at("Teddy"));
+    fs::write(at("mine.toml"), "levels = 2\n").unwrap();
+    let methods = "--method paper --method fgs --method mine.toml";
+    let told = evaluated(&folder, &format!("Teddy {methods} --report out --json out.json"));
+    let heads: Vec<_> = told.stdout.lines().filter(|line| line.starts_with("method ")).collect();
+    assert_eq!(heads, ["method paper", "method fgs + mine.toml"]);
+
+    // Figures and methods are those of single evaluations.
+    let both = json(at("out.json"));
+    assert_eq!(both["beside"].as_array().unwrap().len(), 1);
+    let alone = ["paper", "fgs --method mine.toml"].map(|method| {
+        evaluated(&folder, &format!("Teddy --method {method} --json - --report single")).json()
+    });
+    for (found, alone) in [&both, &both["beside"][0]].into_iter().zip(&alone) {
+        assert_eq!(found["method"], alone["method"]);
+        assert_eq!(found["mean"], alone["mean"]);
+        assert!(alone["name"].is_null() && alone["beside"].is_null());
+    }
+    assert_eq!((&both["name"], &both["beside"][0]["name"]), (&"paper".into(), &"fgs + mine.toml".into()));
+    // Control: the methods differ.
+    assert_ne!(alone[0]["mean"], alone[1]["mean"]);
+
+    // What the methods share is there once, then each kind of map is there by one and by the other.
+    let page = fs::read_to_string(at("out/index.html")).unwrap();
+    let mut expected: Vec<_> =
+        ["left", "zones", "truth"].iter().map(|kind| format!("1-Teddy-{kind}.png")).collect();
+    for kind in ["disparity", "error", "raw", "raw-error", "confidence", "validity"] {
+        expected.extend(["1-paper", "2-fgs___mine_toml"].map(|by| format!("1-Teddy-{by}-{kind}.png")));
+    }
+    assert_eq!(attributes(&page, "data-file"), expected);
+    assert!(page.contains("<b>Raw signed error by fgs + mine.toml</b>"));
+    assert!(page.contains("grid-template-columns: repeat(2, 1fr)"));
+    for (of, name) in [(&both, "paper"), (&both["beside"][0], "fgs + mine.toml")] {
+        let avg = of["mean"]["final"]["all"]["avg"].as_f64().unwrap();
+        let row = format!("<td class=\"text\">final by {name}</td><td>{avg:.3}</td>");
+        assert!(page.contains(&row), "{row}");
+        assert!(page.contains(&format!("<h2>Method by {name}</h2>")));
+    }
+    // The second method's pictures are those of its own report.
+    for kind in ["disparity", "raw-error"] {
+        let [beside, alone] =
+            [format!("out/1-Teddy-2-fgs___mine_toml-{kind}.png"), format!("single/1-Teddy-{kind}.png")]
+                .map(|file| fs::read(at(&file)).unwrap());
+        assert!(beside == alone, "{kind}");
+    }
+
+    // Only evaluations of pairs compare methods.
+    refused(&folder, &format!("submission up MINE Teddy {methods}"), 2, "--method & fgs & put it first");
+}

@@ -9,11 +9,17 @@ use crate::table::Table;
 /// The figures of all pairs, with method and device.
 #[derive(Serialize)]
 pub(super) struct Findings {
+    /// What `--method` calls the method; `None` for the only one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) name: Option<String>,
     pub(super) method: Option<Method>,
     pub(super) ran_on: Option<String>,
     pub(super) pairs: Vec<Scored>,
     /// The means over all pairs.
     pub(super) mean: Figures,
+    /// The figures of the other methods, if there are any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) beside: Vec<Self>,
 }
 
 /// The figures of one pair.
@@ -53,7 +59,17 @@ impl Findings {
             confidence: over(&pairs, |f| f.confidence.as_ref(), Sparsification::mean),
             validity: over(&pairs, |f| f.validity.as_ref(), Detection::mean),
         };
-        Self { method, ran_on, pairs, mean }
+        Self { name: None, method, ran_on, pairs, mean, beside: Vec::new() }
+    }
+
+    /// These findings, then those of the other methods.
+    pub(super) fn of_each_method(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.beside)
+    }
+
+    /// `word`, followed by the name of the method if there is one.
+    pub(super) fn qualified(&self, word: &str) -> String {
+        self.name.as_ref().map_or_else(|| word.into(), |name| format!("{word} by {name}"))
     }
 
     /// Adds the rows of all pairs to a table, and for two or more pairs of their mean, each after a rule.

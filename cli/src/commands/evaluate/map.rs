@@ -12,7 +12,7 @@ use crate::pairs::folder;
 
 use super::findings::{Figures, Findings, Scored};
 use super::metrics;
-use super::report::{self, ReportArgs};
+use super::report::{self, Pictures, ReportArgs};
 use super::scenes::SceneArgs;
 
 const EXAMPLES: &str = "\
@@ -56,11 +56,13 @@ pub(super) fn run(args: &Args) -> Result<()> {
         console::say(&format!("warning: {map} and {truth} seem to use opposite signs: negate one of them"));
     }
     let name = map.file_stem().unwrap_or(map.as_os_str()).to_string_lossy().into_owned();
-    let pictures = begun.as_ref().map(|_| report::pictures(&name, ground.truth(), &estimate, None));
-    let pictures: Vec<_> = pictures.transpose()?.into_iter().collect();
+    let mut pictures = Pictures::default();
+    if begun.is_some() {
+        pictures.add(&name, ground.truth(), &estimate, None)?;
+    }
     let figures = Figures { finished: Some(ground.evaluate(&estimate)?), ..Figures::default() };
     let findings = Findings::new(None, None, vec![Scored { name, figures, seconds: None }]);
-    report::deliver(json, &findings, &metrics::text(&findings), begun, &pictures)
+    report::deliver(json, &findings, &metrics::text(&findings), begun, &[pictures])
 }
 
 /// Whether negating a map brings it much closer to the ground truth.

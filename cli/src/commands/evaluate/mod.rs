@@ -21,9 +21,13 @@ Examples:
   mrfgs evaluate Teddy Cones
   mrfgs evaluate Teddy --method paper --json figures.json
   mrfgs evaluate Teddy Cones --report report  # then open report/index.html
+  mrfgs evaluate Teddy --method paper --method fgs --report report
   mrfgs evaluate Teddy Cones --breakdown
   mrfgs evaluate HalfSize/Art --truth-scale 2
   mrfgs evaluate map mine.pfm --truth disp0GT.pfm --mask mask0nocc.png";
+
+const METHOD: &str = "A preset, or a TOML file that overrides keys of the preset; `mrfgs presets` lists both. May be repeated: files \
+    override what is before them, and each further preset begins another method to compare [default: default]";
 
 /// Match pairs with ground truth and print their errors
 ///
@@ -35,8 +39,12 @@ Examples:
 /// The table shows the map before post-processing (raw) and the final one: average error, RMS (px), PSNR against 255 (dB), pixels wrong by
 /// more than 0.5, 1, 2 and 4 px or invalid (%), and valid ones (%), over all pixels with ground truth and over those seen by both views
 /// (nonocc).
+///
+/// Several presets (--method paper --method fgs) are compared: each has a table, and a report shows their maps side by side. --set applies
+/// to all of them. --json then contains the first method with its `name`, and the others under `beside`.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(after_help = EXAMPLES, mut_arg("method", |method| method.help(METHOD)))]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(disable_help_subcommand = true)]
 pub(crate) struct Args {
     #[command(subcommand)]

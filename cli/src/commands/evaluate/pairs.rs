@@ -2,12 +2,16 @@
 
 use std::path::PathBuf;
 
+use mrfgs::maps::Maps;
+
 use crate::failure::Result;
+use crate::pairs::folder::Scene;
 use crate::stop;
 
+use super::findings::Findings;
 use super::prior::SampledPoints;
-use super::report::{self, ReportArgs};
-use super::scenes::RunArgs;
+use super::report::{self, Pictures, ReportArgs};
+use super::scenes::{Called, RunArgs};
 use super::{breakdown, metrics};
 
 /// The arguments of an evaluation.
@@ -56,18 +60,27 @@ pub(super) fn run(args: &PairsArgs) -> Result<()> {
     let json = args.run.json();
     let begun = args.report.begin(json)?;
     let sampled = args.prior_from_truth.map(|points| (points, args.prior_seed));
-    let mut pictures = Vec::new();
-    let findings =
-        args.run.match_all(&args.dirs, args.run.method()?, execution, sampled, |scene, maps, _| {
-            if begun.is_some() {
+    let (first, others) = args.run.methods()?;
+    let mut pictures: Vec<_> = args.dirs.iter().map(|_| Pictures::default()).collect();
+    let mut matched = |(name, method): Called| {
+        let mut of_pairs = pictures.iter_mut();
+        let see = |scene: &Scene, maps: &Maps, _| {
+            if let (Some(_), Some(of_pair)) = (&begun, of_pairs.next()) {
                 let (truth, estimate) = (scene.ground.truth(), maps.final_map());
-                pictures.push(report::pictures(&scene.name, truth, &estimate, Some((&scene.pair, maps)))?);
+                of_pair.add(&scene.name, truth, &estimate, Some((&scene.pair, maps)))?;
             }
             Ok(())
-        })?;
-    let mut text = metrics::text(&findings);
-    if args.breakdown {
-        text.push_str(&breakdown::text(&findings));
-    }
+        };
+        let found = args.run.match_all(&args.dirs, method, execution.clone(), sampled, see)?;
+        Ok(Findings { name, ..found })
+    };
+    let mut findings = matched(first)?;
+    findings.beside = others.into_iter().map(matched).collect::<Result<_>>()?;
+    let texts = findings.of_each_method().map(|findings| {
+        let head = findings.name.as_ref().map(|name| format!("method {name}\n")).unwrap_or_default();
+        let breakdown = if args.breakdown { breakdown::text(findings) } else { String::new() };
+        head + &metrics::text(findings) + &breakdown
+    });
+    let text = texts.collect::<Vec<_>>().join("\n");
     report::deliver(json, &findings, &text, begun, &pictures)
 }

@@ -17,7 +17,7 @@ use crate::failure::Result;
 use crate::outputs::{StagedFolder, files};
 use crate::text::figure;
 
-use super::findings::{Figures, Findings};
+use super::findings::{Figures, Findings, Scored};
 use super::metrics::COLUMNS;
 
 /// The error in pixels at the end of the colour scale, the same for all pairs so that they can be compared.
@@ -38,9 +38,9 @@ pub(super) struct ReportArgs {
     /// Writes a page with all figures and pictures (index.html), and the pictures as PNG files
     ///
     /// For each pair it shows the left view, its texture zones, disparity and ground truth in the same colours, the signed error (estimate
-    /// minus truth), the disparity before post-processing and its error, confidence and validity; for a finished map only the maps. The page
-    /// needs no other files and no network. An existing
-    /// folder must be empty or contain only an earlier report (its index.html names mrfgs as its generator), which is replaced.
+    /// minus truth), the disparity before post-processing and its error, confidence and validity; for a finished map only the maps. Maps of
+    /// several methods are side by side. The page needs no other files and no network. An existing folder must be empty or contain only an
+    /// earlier report (its index.html names mrfgs as its generator), which is replaced.
     #[arg(long, value_name = "FOLDER")]
     report: Option<PathBuf>,
 }
@@ -89,53 +89,153 @@ pub(super) struct Picture {
     png: Vec<u8>,
 }
 
-/// The pictures of one pair, in the order of the page; `matched` is `None` for a finished map.
-pub(super) fn pictures(
-    name: &str,
-    truth: &Plane<f32>,
-    estimate: &Plane<f32>,
-    matched: Option<(&Pair, &Maps)>,
-) -> Result<Vec<Picture>> {
-    // Estimate and ground truth share the scale of the ground truth.
-    let known = || truth.data().iter().copied().filter(|d| d.is_finite());
-    let (min, max) = (known().fold(f32::INFINITY, f32::min), known().fold(f32::NEG_INFINITY, f32::max));
-    let (min, max) = (min.floor(), max.ceil().max(min.floor() + 1.0));
-    let scale = format!("{min} to {max} px, near is warm");
+impl Picture {
+    fn new(
+        pair: &str,
+        file: &'static str,
+        title: &'static str,
+        alt: &str,
+        legend: String,
+        picture: &Plane<[u8; 3]>,
+    ) -> Result<Self> {
+        let png = picture.png(Path::new(file))?;
+        Ok(Self { file, title, alt: format!("{pair}: {alt}"), legend, size: picture.size(), png })
+    }
+}
 
-    let mut all = Vec::new();
-    let mut add = |file, title, alt: &str, legend: String, picture: &Plane<[u8; 3]>| -> Result<()> {
-        let (alt, size) = (format!("{name}: {alt}"), picture.size());
-        all.push(Picture { file, title, alt, legend, size, png: picture.png(Path::new(file))? });
+/// The pictures of one pair.
+#[derive(Default)]
+pub(super) struct Pictures {
+    /// Those that do not depend on the method.
+    shared: Vec<Picture>,
+    /// Those of each method: the same kinds in the same order.
+    own: Vec<Vec<Picture>>,
+}
+
+/// A picture on the page.
+struct Shown<'a> {
+    /// The method that it is of, if there are several.
+    of: Option<&'a Findings>,
+    /// The file name: unique, and safe in a page and on every file system.
+    file: String,
+    picture: &'a Picture,
+}
+
+impl Pictures {
+    /// Adds the pictures of another method, and the shared ones if it is the first. `matched` is `None` for a finished map.
+    pub(super) fn add(
+        &mut self,
+        name: &str,
+        truth: &Plane<f32>,
+        estimate: &Plane<f32>,
+        matched: Option<(&Pair, &Maps)>,
+    ) -> Result<()> {
+        let scale = Scale::of(truth);
+        if self.own.is_empty() {
+            self.shared = shared(name, truth, scale, matched.map(|(pair, _)| pair))?;
+        }
+        self.own.push(own(name, truth, scale, estimate, matched.map(|(_, maps)| maps))?);
         Ok(())
-    };
-    if let Some((pair, _)) = matched {
-        add("left", "Left view", "the left view", "The reference view.".into(), &pair.left().to_rgb8())?;
+    }
+
+    /// All pictures of the pair with this number in the order of the page: the same kind of all methods, one after the other.
+    fn shown<'a>(&'a self, number: usize, pair: &str, findings: &'a Findings) -> Vec<Shown<'a>> {
+        let pair = format!("{}-{}", number + 1, plain(pair));
+        let file = |stem: &str, picture: &Picture| format!("{stem}-{}.png", picture.file);
+        let mut all: Vec<_> = self
+            .shared
+            .iter()
+            .map(|picture| Shown { of: None, file: file(&pair, picture), picture })
+            .collect();
+        for kind in 0..self.own.first().map_or(0, Vec::len) {
+            for (i, (own, of)) in self.own.iter().zip(findings.of_each_method()).enumerate() {
+                let stem = of.name.as_ref().map(|name| format!("{pair}-{}-{}", i + 1, plain(name)));
+                let (file, picture) = (file(stem.as_ref().unwrap_or(&pair), &own[kind]), &own[kind]);
+                all.push(Shown { of: of.name.as_ref().map(|_| of), file, picture });
+            }
+        }
+        all
+    }
+}
+
+/// The colour scale of a pair's maps: that of its ground truth.
+#[derive(Clone, Copy)]
+struct Scale {
+    min: f32,
+    max: f32,
+}
+
+impl Scale {
+    fn of(truth: &Plane<f32>) -> Self {
+        let known = || truth.data().iter().copied().filter(|d| d.is_finite());
+        let (min, max) = (known().fold(f32::INFINITY, f32::min), known().fold(f32::NEG_INFINITY, f32::max));
+        Self { min: min.floor(), max: max.ceil().max(min.floor() + 1.0) }
+    }
+
+    fn coloured(self, map: &Plane<f32>) -> Plane<[u8; 3]> {
+        colour::preview(map, self.min, self.max, ColourMap::default())
+    }
+}
+
+impl std::fmt::Display for Scale {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{} to {} px, near is warm", self.min, self.max)
+    }
+}
+
+/// The views, and the ground truth of the pair called `name`; without a `pair` the ground truth alone.
+fn shared(name: &str, truth: &Plane<f32>, scale: Scale, pair: Option<&Pair>) -> Result<Vec<Picture>> {
+    let mut all = Vec::new();
+    if let Some(pair) = pair {
+        let (alt, legend) = ("the left view", "The reference view.".into());
+        all.push(Picture::new(name, "left", "Left view", alt, legend, &pair.left().to_rgb8())?);
         let zones = zones::segment(pair.left(), &zones::Options::default());
         let legend =
             format!("{} zones by Gabor filters and K-means, as the preset paper uses them.", zones.count);
-        let picture = zones.map.map(|&zone| colour::zone(zone));
-        add("zones", "Texture zones", "texture zones of the left view", legend, &picture)?;
+        let (alt, picture) = ("texture zones of the left view", zones.map.map(|&zone| colour::zone(zone)));
+        all.push(Picture::new(name, "zones", "Texture zones", alt, legend, &picture)?);
     }
+    let (alt, legend) = (format!("true disparity, {scale}"), format!("{scale}; black: unknown."));
+    all.push(Picture::new(name, "truth", "Ground truth", &alt, legend, &scale.coloured(truth))?);
+    Ok(all)
+}
+
+/// The maps of a method for the pair called `name`; without `maps` the estimate alone.
+fn own(
+    name: &str,
+    truth: &Plane<f32>,
+    scale: Scale,
+    estimate: &Plane<f32>,
+    maps: Option<&Maps>,
+) -> Result<Vec<Picture>> {
+    let mut all = Vec::new();
+    let mut add = |file, title, alt: &str, legend: String, picture: &Plane<[u8; 3]>| -> Result<()> {
+        all.push(Picture::new(name, file, title, alt, legend, picture)?);
+        Ok(())
+    };
     let legend = format!("{scale}; black: none. The same scale as the truth.");
-    let picture = colour::preview(estimate, min, max, ColourMap::default());
-    add("disparity", "Disparity", &format!("estimated disparity, {scale}"), legend, &picture)?;
-    let picture = colour::preview(truth, min, max, ColourMap::default());
-    let legend = format!("{scale}; black: unknown.");
-    add("truth", "Ground truth", &format!("true disparity, {scale}"), legend, &picture)?;
-    let alt = "estimate minus truth, blue where too small, red where too large";
-    let legend = format!(
+    let alt = format!("estimated disparity, {scale}");
+    add("disparity", "Disparity", &alt, legend.clone(), &scale.coloured(estimate))?;
+    let alt_of_error = "estimate minus truth, blue where too small, red where too large";
+    let legend_of_error = format!(
         "Estimate minus truth, -{ERROR_LIMIT} to {ERROR_LIMIT} px and beyond. Blue: too far, red: too near, grey: \
          truth unknown, black: no estimate."
     );
-    add("error", "Signed error", alt, legend.clone(), &colour::error(estimate, truth, ERROR_LIMIT))?;
-    if let Some((_, maps)) = matched {
+    let picture = colour::error(estimate, truth, ERROR_LIMIT);
+    add("error", "Signed error", alt_of_error, legend_of_error.clone(), &picture)?;
+    if let Some(maps) = maps {
         let raw = maps.raw_map();
-        let picture = colour::preview(&raw, min, max, ColourMap::default());
-        let alt_of_map = format!("estimated disparity before post-processing, {scale}");
-        let scale = format!("{scale}; black: none. The same scale as the truth.");
-        add("raw", "Raw disparity", &alt_of_map, format!("Before post-processing, {scale}"), &picture)?;
-        let alt = format!("{alt}, before post-processing");
-        add("raw-error", "Raw signed error", &alt, legend, &colour::error(&raw, truth, ERROR_LIMIT))?;
+        let alt = format!("estimated disparity before post-processing, {scale}");
+        add(
+            "raw",
+            "Raw disparity",
+            &alt,
+            format!("Before post-processing, {legend}"),
+            &scale.coloured(&raw),
+        )?;
+        let alt = format!("{alt_of_error}, before post-processing");
+        let picture = colour::error(&raw, truth, ERROR_LIMIT);
+        add("raw-error", "Raw signed error", &alt, legend_of_error, &picture)?;
         let alt = "confidence of every pixel, bright is sure";
         let legend = "How sure each pixel is, 0 to 255; bright is sure. It is how much worse the second-best disparity fits (in 1/8 nat), averaged over neighbouring pixels.";
         add("confidence", "Confidence", alt, legend.into(), &colour::grey(&maps.confidence))?;
@@ -165,7 +265,7 @@ pub(super) fn deliver(
     findings: &Findings,
     text: &str,
     begun: Option<StagedFolder>,
-    pictures: &[Vec<Picture>],
+    pictures: &[Pictures],
 ) -> Result<()> {
     files::deliver(json, findings, text, |_| {
         let Some(staged) = begun else { return Ok(()) };
@@ -173,7 +273,8 @@ pub(super) fn deliver(
             write::save(&staged.path().join(name), bytes).map_err(|e| staged.named(e))
         };
         for (i, (pair, pictures)) in findings.pairs.iter().zip(pictures).enumerate() {
-            pictures.iter().try_for_each(|p| save(file_name(i, &pair.name, p), &p.png))?;
+            let mut shown = pictures.shown(i, &pair.name, findings).into_iter();
+            shown.try_for_each(|Shown { file, picture, .. }| save(file, &picture.png))?;
         }
         save(PAGE.to_owned(), page(findings, pictures).as_bytes())?;
         refuse_strangers(&staged)?;
@@ -181,11 +282,10 @@ pub(super) fn deliver(
     })
 }
 
-/// The file name of a picture: unique, and safe in a page and on every file system.
-fn file_name(pair: usize, name: &str, picture: &Picture) -> String {
+/// A name as a part of file names.
+fn plain(name: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
-    let name: String = name.chars().map(plain).take(40).collect();
-    format!("{}-{name}-{}.png", pair + 1, picture.file)
+    name.chars().map(plain).take(40).collect()
 }
 
 const STYLE: &str = "
@@ -197,6 +297,7 @@ body { margin: 0 auto; max-width: 100rem; padding: 1.5rem; font: 15px/1.5 system
   background: var(--ground); }
 h1 { font-size: 1.6rem; margin: 0; }
 h2 { font-size: 1.25rem; margin: 2.5rem 0 .5rem; }
+h3 { font-size: 1rem; margin: 1rem 0 .3rem; }
 p { margin: .3rem 0; }
 p, figcaption { color: var(--soft); }
 figcaption { margin-top: .3rem; font-size: .87rem; }
@@ -208,7 +309,7 @@ th { color: var(--soft); font-weight: 600; }
 th[scope=row], .text { text-align: left; }
 tr.mean > * { font-weight: 600; }
 tr:not(.mean) + .mean > * { border-top: 2px solid var(--soft); }
-.pictures { display: grid; gap: 1.2rem; align-items: start; }
+.pictures { display: grid; gap: 1.2rem; align-items: start; margin: 1.2rem 0; }
 @media (min-width: 40rem) { .pictures { grid-template-columns: 1fr 1fr; } }
 @media (min-width: 64rem) { .pictures { grid-template-columns: 1fr 1fr 1fr; } }
 figure { margin: 0; min-width: 0; }
@@ -219,7 +320,7 @@ pre { columns: 24rem; font-size: .87rem; white-space: pre-wrap; }
 ";
 
 /// The complete page.
-fn page(findings: &Findings, pictures: &[Vec<Picture>]) -> String {
+fn page(findings: &Findings, pictures: &[Pictures]) -> String {
     let names: Vec<_> = findings.pairs.iter().map(|pair| pair.name.as_str()).collect();
     let version = env!("CARGO_PKG_VERSION");
     let mut out = String::new();
@@ -240,54 +341,87 @@ fn page(findings: &Findings, pictures: &[Vec<Picture>]) -> String {
 
     // All pairs, over all pixels.
     let mut rows = Vec::new();
-    for pair in &findings.pairs {
-        rows.extend(pair.figures.maps().map(|(map, report)| ("", &*pair.name, map, &report.all)));
+    for i in 0..findings.pairs.len() {
+        for of in findings.of_each_method() {
+            let Scored { name, figures, .. } = &of.pairs[i];
+            rows.extend(
+                figures.maps().map(|(map, report)| ("", name.clone(), of.qualified(map), &report.all)),
+            );
+        }
     }
     if findings.pairs.len() > 1 {
-        rows.extend(findings.mean.maps().map(|(map, report)| ("mean", "mean", map, &report.all)));
+        for of in findings.of_each_method() {
+            let maps = of.mean.maps();
+            rows.extend(maps.map(|(map, report)| ("mean", "mean".into(), of.qualified(map), &report.all)));
+        }
     }
     table(&mut out, ["pair", "map"], rows.into_iter());
 
     for (i, (pair, pictures)) in findings.pairs.iter().zip(pictures).enumerate() {
         let _ = writeln!(out, "<section>\n<h2>{}</h2>", escaped(&pair.name));
-        if let Some(seconds) = pair.seconds {
-            let _ = writeln!(out, "<p>Matched in {seconds:.2} s.</p>");
-        }
         let mut rows = Vec::new();
-        for (map, Report { all, nonocc }) in pair.figures.maps() {
-            rows.push(("", map, "all", all));
-            rows.extend(nonocc.as_ref().map(|m| ("", map, "seen in both views", m)));
+        for of in findings.of_each_method() {
+            let Scored { figures, seconds, .. } = &of.pairs[i];
+            if let Some(seconds) = seconds {
+                let matched = of.qualified("Matched");
+                let _ = writeln!(out, "<p>{} in {seconds:.2} s.</p>", escaped(&matched));
+            }
+            for (map, Report { all, nonocc }) in figures.maps() {
+                rows.push(("", of.qualified(map), "all".into(), all));
+                rows.extend(nonocc.as_ref().map(|m| ("", of.qualified(map), "seen in both views".into(), m)));
+            }
         }
         table(&mut out, ["map", "pixels"], rows.into_iter());
-        breakdown(&mut out, &pair.figures);
-        out.push_str("<div class=\"pictures\">\n");
-        for picture in pictures {
-            let (width, height) = picture.size;
-            let _ = writeln!(
-                out,
-                "<figure><img {FILE}\"{}\" alt=\"{}\" width=\"{width}\" height=\"{height}\" \
-                 src=\"data:image/png;base64,{}\"><figcaption><b>{}</b> {}</figcaption></figure>",
-                file_name(i, &pair.name, picture),
-                escaped(&picture.alt),
-                BASE64.encode(&picture.png),
-                picture.title,
-                picture.legend
-            );
+        for of in findings.of_each_method() {
+            if let Some(name) = &of.name {
+                let _ = writeln!(out, "<h3>{}</h3>", escaped(name));
+            }
+            breakdown(&mut out, &of.pairs[i].figures);
         }
-        out.push_str("</div>\n</section>\n");
+        gallery(&mut out, &pictures.shown(i, &pair.name, findings), 1 + findings.beside.len());
+        out.push_str("</section>\n");
     }
-    if let Some(method) = &findings.method {
-        let _ = writeln!(out, "<h2>Method</h2>\n<pre>{}</pre>", escaped(&method.table().to_string()));
+    for of in findings.of_each_method() {
+        if let Some(method) = &of.method {
+            let (head, method) = (escaped(&of.qualified("Method")), escaped(&method.table().to_string()));
+            let _ = writeln!(out, "<h2>{head}</h2>\n<pre>{method}</pre>");
+        }
     }
     out.push_str("</body>\n</html>\n");
     out
+}
+
+/// The pictures of a pair. Those of several `methods` have a column for each.
+fn gallery(out: &mut String, shown: &[Shown], methods: usize) {
+    let (shared, own) = shown.split_at(shown.iter().take_while(|shown| shown.of.is_none()).count());
+    let columns = format!(r#" style="grid-template-columns: repeat({methods}, 1fr)""#);
+    for (pictures, style) in [(shared, ""), (own, &*columns)] {
+        if pictures.is_empty() {
+            continue;
+        }
+        let _ = writeln!(out, "<div class=\"pictures\"{style}>");
+        for Shown { of, file, picture } in pictures {
+            let (width, height) = picture.size;
+            let called = |text: &str| escaped(&of.map_or_else(|| text.into(), |of| of.qualified(text)));
+            let _ = writeln!(
+                out,
+                "<figure><img {FILE}\"{file}\" alt=\"{}\" width=\"{width}\" height=\"{height}\" \
+                 src=\"data:image/png;base64,{}\"><figcaption><b>{}</b> {}</figcaption></figure>",
+                called(&picture.alt),
+                BASE64.encode(&picture.png),
+                called(picture.title),
+                picture.legend
+            );
+        }
+        out.push_str("</div>\n");
+    }
 }
 
 /// A table of metrics; each row has a CSS class, two names and the metrics.
 fn table<'a>(
     out: &mut String,
     heads: [&str; 2],
-    rows: impl Iterator<Item = (&'a str, &'a str, &'a str, &'a Metrics)>,
+    rows: impl Iterator<Item = (&'a str, String, String, &'a Metrics)>,
 ) {
     let [first, second] = heads;
     let _ = write!(
@@ -301,8 +435,9 @@ fn table<'a>(
     for (class, first, second, m) in rows {
         let _ = write!(
             out,
-            "<tr class=\"{class}\"><th scope=\"row\">{}</th><td class=\"text\">{second}</td>",
-            escaped(first)
+            "<tr class=\"{class}\"><th scope=\"row\">{}</th><td class=\"text\">{}</td>",
+            escaped(&first),
+            escaped(&second)
         );
         for (.., decimals, value) in COLUMNS {
             let _ = write!(out, "<td>{}</td>", figure(value(m), decimals));

@@ -36,6 +36,9 @@ pub(super) struct SceneArgs {
     pub(super) reading: ReadingArgs,
 }
 
+/// A method and its name, if it needs one.
+pub(super) type Called = (Option<String>, Method);
+
 /// Flags for reading and matching pairs with ground truth.
 #[derive(clap::Args)]
 pub(super) struct RunArgs {
@@ -55,6 +58,14 @@ impl RunArgs {
 
     pub(super) fn method(&self) -> Result<Method> {
         self.method.method()
+    }
+
+    /// The first method and any others to compare, with their names if there are several.
+    pub(super) fn methods(&self) -> Result<(Called, Vec<Called>)> {
+        let (first, others) = self.method.each();
+        let several = !others.is_empty();
+        let called = |args: MethodArgs| Ok((args.name().filter(|_| several), args.method()?));
+        Ok((called(first)?, others.into_iter().map(called).collect::<Result<_>>()?))
     }
 
     /// See [`ExecutionArgs::execution`].
