@@ -17,7 +17,8 @@ pub mod votes;
 
 use crate::error::Result;
 use crate::options::{
-    Agreement, DisparityRange, LeftRightCheck, MatchSize, MatchingCost, Method, Order, Potential, Pyramid,
+    Agreement, DisparityRange, Fill, LeftRightCheck, MatchSize, MatchingCost, Method, Order, Potential,
+    Pyramid,
 };
 use std::ops::Range;
 
@@ -286,6 +287,26 @@ impl Plan {
     #[must_use]
     pub fn with_prior(self, prior: bool) -> Self {
         Self { prior, ..self }
+    }
+
+    /// Number of looks at the pair: one if nothing is filled in, since the next would see the same, and if message passing may stop
+    /// early, since it then takes all iterations that it needs.
+    #[must_use]
+    pub fn looks(&self) -> u32 {
+        let looks_again = self.method.refinement.fill != Fill::None && self.settled_change().is_none();
+        if looks_again { self.method.schedule.looks } else { 1 }
+    }
+
+    /// Whether any look adds a prior to the evidence.
+    #[must_use]
+    pub fn has_priors(&self) -> bool {
+        self.prior || self.looks() > 1
+    }
+
+    /// Whether the costs of a level and its messages share memory on the CPU path: not if another look needs the costs again.
+    #[must_use]
+    pub fn costs_share(&self) -> bool {
+        self.shares && self.looks() == 1
     }
 
     /// Size and disparity range of the pair.

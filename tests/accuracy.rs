@@ -62,11 +62,11 @@ fn rendered_scenes() {
         ("rows", 0.35, 3.3, 18.0),
         ("focus", 0.76, 11.4, 26.3),
         ("grain", 0.90, 11.5, 49.5),
-        ("poster", 0.88, 17.5, 37.0),
-        ("screen", 1.10, 9.4, 16.3),
+        ("poster", 0.80, 15.3, 40.0),
+        ("screen", 1.36, 11.5, 16.7),
         ("border", 0.13, 0.5, 3.7),
-        ("corridor", 1.70, 29.3, 48.5),
-        ("behind", 0.50, 4.4, 8.9),
+        ("corridor", 1.94, 32.0, 49.4),
+        ("behind", 0.52, 4.6, 8.9),
     ];
     for (scene, avg, bad2, bad05) in floors {
         let folder = Path::new("testdata").join(scene);

@@ -17,6 +17,7 @@ use mrfgs::low_level::engine::Solution;
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::program::tiles::Tiles;
+use mrfgs::low_level::stage::{LevelPriors, NO_ANCHOR};
 use mrfgs::maps::{Maps, RightMap, flag};
 use mrfgs::options::{DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Order, Potential};
 use pollster::block_on;
@@ -53,6 +54,15 @@ fn right_map(right: &mut Finest, plan: &Plan, pair: &Pair) -> RightMap {
 
 /// Runs the twins of all stages after the estimate, in the documented order.
 fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
+    twin_filled(maps, plan, pair);
+    let last = if plan.method.refinement.plane { twin::plane::plane } else { twin::median::median };
+    last(plan, pair, maps);
+    twin::support::support(plan, maps);
+    twin::far_plane::far_plane(plan, pair, maps);
+}
+
+/// Runs the twins of the stages up to those that smooth.
+fn twin_filled(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     twin::left_right_check::left_right_check(plan, pair, maps);
     if plan.method.refinement.speckle_size > 0 {
         twin::speckle_filter::speckle_filter(plan, maps);
@@ -65,10 +75,21 @@ fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
         twin::vote_fill::vote_fill(plan, pair, maps);
         twin::fill_plane::fill_plane(plan, pair, maps);
     }
-    let last = if plan.method.refinement.plane { twin::plane::plane } else { twin::median::median };
-    last(plan, pair, maps);
-    twin::support::support(plan, maps);
-    twin::far_plane::far_plane(plan, pair, maps);
+}
+
+/// The prior that the twins find for the look after one whose labels and raw disparities are in `finest`.
+fn guessed(finest: &Finest, plan: &Plan, pair: &Pair) -> LevelPriors {
+    let mut maps = Finest { disparity: finest.raw.clone(), ..finest.clone() };
+    twin_filled(&mut maps, plan, pair);
+    twin::support::support(plan, &mut maps);
+    twin::far_plane::far_plane(plan, pair, &mut maps);
+    let mut levels = vec![twin::guess::take(plan, &maps.disparity, &maps.validity, None)];
+    for z in 1..plan.levels.len() {
+        let pooled = twin::guess::pool(plan, z, &levels[z - 1]);
+        levels.push(pooled);
+    }
+    let (width, height) = plan.size();
+    LevelPriors { levels, anchors: Plane::filled(width, height, NO_ANCHOR) }
 }
 
 /// The first difference between the maps of two matches.
@@ -106,27 +127,36 @@ fn matched(pair: &Pair, plan: &Plan, threads: usize) -> Maps {
 
 #[test]
 fn the_stages_run_in_order() {
-    let mut rights = 0;
+    let (mut rights, mut looked_again) = (0, 0);
     for seed in 0..60 {
         let mut random = Random::new(seed);
         let size = random.pick(&[(1, 1), (1, 12), (15, 1), (23, 14), (30, 22)]);
         let labels = random.pick(&[1, 2, 9, 17]);
         let neighbours = random.pick(&[0, 2, 8]);
         let min = random.pick(&[-20, -3, 0, 5]);
-        let plan = random::plan(size, min, labels, &random::method(&mut random, neighbours));
+        let mut method = random::method(&mut random, neighbours);
+        method.schedule.looks = random.pick(&[1, 2, 3]);
+        let plan = random::plan(size, min, labels, &method);
         let pair = random::pair(&mut random, size.0, size.1);
         for (name, mut backend) in backends() {
             let backend = backend.as_mut();
-            let iterations = estimated(backend, &pair, &plan);
+            let mut iterations = estimated(backend, &pair, &plan);
             let mut finest = Finest::zero(size);
-            finest.label = block_on(backend.map(Map::Label)).unwrap();
-            finest.best = block_on(backend.map(Map::Best)).unwrap();
-            finest.runner_up = block_on(backend.map(Map::RunnerUp)).unwrap();
-            finest.right_label = match plan.method.refinement.left_right_check {
-                LeftRightCheck::SecondMatch => second_match(&pair, &plan),
-                _ => block_on(backend.map(Map::RightLabel)).unwrap(),
-            };
-            finest.raw = block_on(backend.map(Map::Raw)).unwrap();
+            for look in 0..plan.looks() {
+                if look > 0 {
+                    looked_again += 1;
+                    let guess = guessed(&finest, &plan, &pair);
+                    iterations += estimated_again(backend, &pair, &plan, guess);
+                }
+                finest.label = block_on(backend.map(Map::Label)).unwrap();
+                finest.best = block_on(backend.map(Map::Best)).unwrap();
+                finest.runner_up = block_on(backend.map(Map::RunnerUp)).unwrap();
+                finest.right_label = match plan.method.refinement.left_right_check {
+                    LeftRightCheck::SecondMatch => second_match(&pair, &plan),
+                    _ => block_on(backend.map(Map::RightLabel)).unwrap(),
+                };
+                finest.raw = block_on(backend.map(Map::Raw)).unwrap();
+            }
             let mut expected = finished(&mut finest, &plan, &pair);
             if plan.method.refinement.right_map {
                 let mut right = right_raw(&finest, &plan, &pair);
@@ -142,6 +172,7 @@ fn the_stages_run_in_order() {
         }
     }
     assert!(rights > 10, "{rights} maps of the right view");
+    assert!(looked_again > 30, "{looked_again} second looks");
 }
 
 /// With a second match and no speckle filter, the right map equals the map of the mirrored pair, bit for bit.
@@ -152,6 +183,8 @@ fn the_right_map_is_the_map_of_the_mirrored_pair() {
     // The speckle filter discards ties, and votes need confidence, which is unknown for the right view.
     (method.refinement.right_map, method.refinement.speckle_size) = (true, 0);
     method.refinement.fill = Fill::Row;
+    // The mirrored pair is matched in one look.
+    method.schedule.looks = 1;
     method.front = random::as_it_is();
     let mut random = Random::new(12);
     let plan = random::plan((41, 30), -3, 17, &method);
@@ -175,6 +208,7 @@ fn tiles_are_matched_alone_and_finished_together() {
         let (width, height) = random.pick(&[(100, 80), (60, 130), (131, 61)]);
         let mut method = random::method(&mut random, [0, 2, 8][seed as usize % 3]);
         (method.graph.levels, method.tiles.memory) = (method.graph.levels.min(3), 1);
+        method.schedule.looks = 1;
         let plan =
             random::plan((width, height), random.pick(&[-12, -3, 0]), random.pick(&[2, 9, 17]), &method);
         let Ok(tiles) = Tiles::with_overlap(&plan, random.pick(&[0, 2, 5])) else { continue };
@@ -272,7 +306,19 @@ fn matched_whole(pair: &Pair, plan: &Plan) -> Maps {
 
 /// Runs all stages up to [`Stage::SubPixel`]; returns the number of iterations.
 fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
-    backend.prepare(plan, Prepared::new(pair)).unwrap();
+    estimated_from(backend, Prepared::new(pair), plan)
+}
+
+/// Like [`estimated`], for a look after the first: one iteration per phase, and a prior.
+fn estimated_again(backend: &mut dyn Backend, pair: &Pair, plan: &Plan, prior: LevelPriors) -> u32 {
+    let mut again = plan.clone().with_prior(true);
+    again.method.schedule.looks = 1;
+    again.phases.iter_mut().for_each(|phase| phase.iterations = phase.iterations.min(1));
+    estimated_from(backend, Prepared { prior: Some(prior), ..Prepared::new(pair) }, &again)
+}
+
+fn estimated_from(backend: &mut dyn Backend, prepared: Prepared, plan: &Plan) -> u32 {
+    backend.prepare(plan, prepared).unwrap();
     backend.run(Stage::Cost).unwrap();
     for z in 0..plan.levels.len() {
         backend.run(Stage::Graph(z)).unwrap();
@@ -293,6 +339,7 @@ fn second_match(pair: &Pair, plan: &Plan) -> Plane<i32> {
     let mirrored = mirrored(pair);
     let mut method = plan.method.clone();
     (method.refinement.left_right_check, method.refinement.sub_pixel) = (LeftRightCheck::Off, false);
+    method.schedule.looks = 1;
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, plan.range, &method).unwrap();
     let raw = matched(&mirrored, &plan, 1).raw;

@@ -286,7 +286,7 @@ fn a_result_does_not_wait_for_the_next_pair() {
 fn a_device_lost_within_a_sequence_costs_no_pair() {
     let expected = one_by_one();
     let (mut by_device, mut by_cpu) = (false, false);
-    for stages in [0, 30, 200, 250, 300, 400, 500, 700] {
+    for stages in [0, 30, 350, 450, 550, 700, 900, 1200] {
         let Some(gpu) = device(FaultInjection { lost_after: Some(stages), ..FaultInjection::default() })
         else {
             return;

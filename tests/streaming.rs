@@ -47,6 +47,7 @@ fn method(random: &mut Random) -> Method {
     let mut method = random::method(random, neighbours);
     method.schedule.order = Order::CoarseFirst;
     method.schedule.final_iterations = random.pick(&[0, 1, 2, 3, 3, 4, 7]);
+    method.schedule.looks = random.pick(&[1, 1, 2, 3]);
     let by_rows: Vec<_> = MatchingCost::ALL.iter().copied().filter(|cost| cost.facts().by_rows).collect();
     method.cost.matching = random.pick(&by_rows);
     method.cost.outside_cost = method.cost.outside_cost.min(1.625);

@@ -144,14 +144,14 @@ fn wrong_tiles_are_noticed() {
 fn images_are_cut_where_they_always_were() {
     // Size, preset, largest disparity, memory in MiB; number of tiles, and the size of the one that takes the most memory.
     let cuts = [
-        ((450, 375), "default", 63, 60, 6, (256, 224)),
+        ((450, 375), "default", 63, 60, 9, (256, 192)),
         ((450, 375), "default", 255, 150, 20, (416, 96)),
         ((450, 375), "fast", 63, 24, 20, (128, 96)),
         ((450, 375), "paper", 63, 60, 10, (320, 128)),
         ((450, 375), "paper", 63, 150, 2, (450, 224)),
         ((450, 375), "paper", 255, 150, 30, (384, 96)),
         ((450, 375), "paper", 255, 400, 2, (450, 224)),
-        ((1280, 720), "default", 63, 150, 18, (320, 288)),
+        ((1280, 720), "default", 63, 150, 30, (320, 224)),
         ((1280, 720), "default", 255, 400, 12, (640, 256)),
         ((1280, 720), "fast", 255, 150, 35, (256, 128)),
         ((1280, 720), "paper", 63, 150, 21, (512, 160)),
@@ -159,18 +159,22 @@ fn images_are_cut_where_they_always_were() {
         ((1280, 720), "paper", 255, 400, 28, (576, 160)),
         ((1280, 720), "paper", 255, 1024, 6, (1280, 192)),
         ((3000, 2000), "default", 63, 1024, 6, (1568, 736)),
-        ((3000, 2000), "default", 255, 1024, 24, (1216, 320)),
+        ((3000, 2000), "default", 255, 1024, 27, (1216, 288)),
         ((3000, 2000), "fast", 255, 1024, 3, (1500, 360)),
         ((3000, 2000), "paper", 63, 400, 273, (352, 160)),
         ((3000, 2000), "paper", 63, 1024, 12, (1088, 576)),
         ((3000, 2000), "paper", 255, 1024, 80, (864, 192)),
     ];
+    let mut moved = Vec::new();
     for (size, preset, max, memory, count, largest) in cuts {
         let method = Method::preset(preset).unwrap();
         let tiles = Tiles::new(&plan(size, DisparityRange::new(0, max).unwrap(), &method, memory)).unwrap();
-        let found = tiles.largest().size();
-        assert_eq!((tiles.count(), found), (count, largest), "{size:?}, {preset}, {max}, {memory} MiB");
+        let found = (size, preset, max, memory, tiles.count(), tiles.largest().size());
+        if found != (size, preset, max, memory, count, largest) {
+            moved.push(found);
+        }
     }
+    assert!(moved.is_empty(), "{moved:?}");
 }
 
 #[test]
@@ -279,7 +283,8 @@ fn progress_names_the_tiles_and_covers_all_of_them() {
         let mut method = Method::default();
         (method.refinement.left_right_check, method.schedule.iterations) = (left_right_check, 1);
         let tiles = Tiles::new(&plan(pair.size(), range, &method, 12)).unwrap();
-        let count = tiles.count() * if left_right_check == LeftRightCheck::SecondMatch { 2 } else { 1 };
+        let mirrored = u32::from(left_right_check == LeftRightCheck::SecondMatch);
+        let count = tiles.count() * (mirrored + tiles.whole().looks()) as usize;
         let mut seen = Vec::new();
         let mut observer = |progress: Progress| {
             seen.push(progress);
@@ -313,7 +318,9 @@ fn the_matcher_splits_by_the_memory_of_the_method() {
         if tiled {
             assert!(matched.maps == in_tiles(&mut Cpu::default(), &tiles, &pair).maps);
         }
-        for (stage, runs) in [("cost", tiles.count()), ("graph", tiles.count()), ("plane", 1)] {
+        // The tiles of the second look are prepared again.
+        let all = tiles.count() * if tiled { 2 } else { 1 };
+        for (stage, runs) in [("cost", all), ("graph", all), ("vote_fill", 2), ("plane", 1)] {
             let timing = matched.timings.iter().find(|timing| timing.stage == stage).unwrap();
             assert_eq!(timing.runs as usize, runs, "{stage}");
         }

@@ -81,6 +81,11 @@ fn schedule(plan: &Plan) -> Table {
         let (n, head) = (phase.iterations, if i == 0 { "schedule" } else { "" });
         table.row([head, &format!("{n} iteration{} of {levels}", plural(n as usize))]);
     }
+    match plan.looks() {
+        1 => {}
+        2 => table.row(["", "a second look, with 1 iteration each"]),
+        looks => table.row(["", &format!("{} more looks, with 1 iteration each", looks - 1)]),
+    }
     if plan.method.schedule.tolerance > 0.0 {
         let sooner = match plan.method.schedule.order {
             Order::Together => "or fewer",

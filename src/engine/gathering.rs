@@ -7,6 +7,7 @@ use crate::backend::{Backend, Map, Stage, Ticket};
 use crate::error::Result;
 use crate::image::{Pair, Plane};
 use crate::maps::{Maps, RightMap, flag};
+use crate::plan::Plan;
 use crate::program::{Frame, View};
 use crate::watch::Watch;
 use std::time::Duration;
@@ -56,6 +57,16 @@ impl Gathering {
         cpu.keep_time(true)?;
         self.gathered = Some((cpu, right));
         Ok(())
+    }
+
+    /// Starts another look by `plan`, in the same maps. Returns the disparities and the validity of the last one.
+    pub(super) async fn look_again(&mut self, plan: &Plan) -> Result<(Plane<i32>, Plane<u8>)> {
+        let (mut cpu, right) = self.gathered.take().expect("maps of all tiles");
+        self.times.extend(cpu.times().await?);
+        let (pair, maps) = cpu.into_maps();
+        let guess = (maps.disparity.clone(), maps.validity.clone());
+        self.mosaic = Some(Mosaic::again(plan, pair, maps, right));
+        Ok(guess)
     }
 
     /// Replaces the disparities of the left view by those of the right view.

@@ -187,7 +187,7 @@ impl MatchRun {
             Step::Double => {
                 source.double(original, watch)?;
                 gathering.put_aside();
-                running.end_size();
+                running.end_round();
             }
             Step::Enter(frame) => {
                 self.count(backend);
@@ -237,6 +237,11 @@ impl MatchRun {
                 self.count(backend);
                 watch.followed.tile = None;
                 self.gathering.gather()?;
+            }
+            Step::LookAgain => {
+                let guess = gathering.look_again(&program.frames[gathering.whole].plan).await?;
+                source.guess(guess);
+                running.end_round();
             }
             Step::PlaceRight => gathering.place_right()?,
             Step::Ask(view) => gathering.ask(view, backend)?,

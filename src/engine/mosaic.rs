@@ -46,6 +46,15 @@ impl Mosaic {
         Ok(Self { plan: plan.clone(), pair: pair.clone(), maps, right_raw, better })
     }
 
+    /// The maps of an earlier look, which the tiles of the next one fill again.
+    pub(super) fn again(plan: &Plan, pair: Pair, mut maps: MapSet, right_raw: Plane<i32>) -> Self {
+        if plan.reads_right_view() {
+            maps.right.data_mut().fill(NO_LABEL);
+            maps.right_best.data_mut().fill(u16::MAX);
+        }
+        Self { plan: plan.clone(), pair, maps, right_raw, better: Plane::filled(0, 0, false) }
+    }
+
     /// Copies the maps of `view` in the core of `frame` from `backend`, which matched `pair`, the tile's part of the whole pair.
     ///
     /// # Errors

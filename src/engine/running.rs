@@ -9,10 +9,10 @@ pub(super) struct Running {
     pub(super) frame: usize,
     /// Whether the backend's work for it is yet to be counted.
     is_uncounted: bool,
-    /// Iterations of the frame, and the most of any at this size.
+    /// Iterations of the frame, and the most of any in this look at this size.
     pub(super) iterations: u32,
     pub(super) most_iterations: u32,
-    /// Iterations at the pair's own size, while it is matched at twice its size.
+    /// Iterations of the looks and sizes that are done.
     pub(super) earlier_iterations: u32,
     pub(super) traffic: Traffic,
     /// [`Backend::cells`] of each level at the pair's own size, summed over all tiles.
@@ -30,9 +30,9 @@ impl Running {
         self.most_iterations = self.most_iterations.max(self.iterations - idle);
     }
 
-    /// Ends the match at the pair's own size.
-    pub(super) fn end_size(&mut self) {
-        self.earlier_iterations = std::mem::take(&mut self.most_iterations);
+    /// Ends a look of all tiles, or the match at the pair's own size.
+    pub(super) fn end_round(&mut self) {
+        self.earlier_iterations += std::mem::take(&mut self.most_iterations);
     }
 
     /// Counts the work of `backend` for the frame, once.

@@ -24,6 +24,8 @@ pub(super) struct Source {
     pub(super) is_double: bool,
     /// Known disparities of the left view, prepared for the match.
     prior: Option<ReadyPrior>,
+    /// Disparities and validity of the last look, if tiles look again.
+    guess: Option<(Plane<i32>, Plane<u8>)>,
 }
 
 impl Source {
@@ -50,7 +52,7 @@ impl Source {
     /// Replaces the pair by the `original` one at twice its size.
     pub(super) fn double(&mut self, original: &Pair, watch: &mut Watch<'_>) -> Result<()> {
         let doubled = watch.host("double_size", || front::doubled(original, &self.conditioning))?;
-        (self.pair, self.is_double) = (Some(doubled), true);
+        (self.pair, self.is_double, self.guess) = (Some(doubled), true, None);
         self.prior = self.prior.take().map(|ready| ready.with(ready.known.doubled()));
         Ok(())
     }
@@ -66,8 +68,23 @@ impl Source {
         Ok(())
     }
 
+    /// Takes disparities and validity of a look as the guess of the next one.
+    pub(super) fn guess(&mut self, guess: (Plane<i32>, Plane<u8>)) {
+        self.guess = Some(guess);
+    }
+
     /// The prior of the pixels of `frame`, in the labels of its levels.
     pub(super) fn prior_of(&self, frame: &Frame) -> Option<LevelPriors> {
+        let known = self.known_of(frame);
+        let Some((disparity, validity)) = self.guess.as_ref().filter(|_| !frame.mirrored) else {
+            return known;
+        };
+        let guess = (&disparity.crop(&frame.crop), &validity.crop(&frame.crop));
+        Some(front::prior::with_guess(known, guess, &frame.plan))
+    }
+
+    /// What was known of the pixels of `frame` before the match, in the labels of its levels.
+    fn known_of(&self, frame: &Frame) -> Option<LevelPriors> {
         let ready = self.prior.as_ref().filter(|_| frame.plan.prior)?;
         if frame.tile.is_none() && !frame.mirrored {
             return Some(front::prior::levels(ready, &frame.plan));

@@ -9,7 +9,7 @@ mod trust;
 use crate::image::Pair;
 use crate::options::DisparityRange;
 use crate::prior::{Prior, PriorKind, PriorUse};
-pub(crate) use levels::{anchors, levels};
+pub(crate) use levels::{anchors, coarser, guessed, levels, with_guess};
 
 /// A prior that is ready for a match, for the view at the size at which it is matched.
 #[derive(Clone, Debug, PartialEq)]

@@ -22,7 +22,7 @@ words! {
         /// Its own size.
         Full = "full",
         /// Its own size and twice that. Where both maps agree within a pixel, their mean is taken. Where only the larger pair
-        /// measures a pixel, its disparity is taken. A match takes 8 times as long.
+        /// measures a pixel, its disparity is taken. A match takes 7 times as long.
         Double = "double",
     }
 }
@@ -40,6 +40,9 @@ options! {
         /// Iterations after the finest level joins: every second one with the messages between levels, the others with
         /// those of the coarser levels. Only coarse-first uses it.
         final_iterations: u32 = 1, takes whole(0..=1000), unit "iterations", source "not in the paper";
+        /// Number of looks at the pair. Each look after the first takes what the one before has filled in as a weak prior, with one
+        /// iteration after each level has joined.
+        looks: u32 = 2, takes whole(1..=8), unit "looks", source "not in the paper";
         /// Stop when the RMS change of the finest map from one iteration to the next is at most this; 0 runs all iterations.
         tolerance: f64 = 0.0, takes real(0.0..=1e6), unit "pixels", source "algorithm 1", for reproduction;
     }

@@ -96,8 +96,11 @@ impl SentMessages {
         Sent { dependency: self.dependency[z], above, below: self.resolution[z] }
     }
 
-    /// Adds the messages that `stage` sends.
+    /// Adds the messages that `stage` sends. A level whose labels are set anew loses its own.
     pub fn send(&mut self, stage: Stage) {
+        if let Stage::LabelWindow(z) = stage {
+            (self.dependency[z], self.resolution[z]) = (false, false);
+        }
         stage.writes().filter_map(Data::volume).for_each(|volume| self.add(volume));
     }
 
@@ -197,6 +200,8 @@ pub enum Step {
     Place(View),
     /// Ends the tiles; the stages that follow work on the maps of the whole image.
     Gather,
+    /// Takes what the maps of the whole image were filled with as the guess for the tiles that follow, which fill these maps again.
+    LookAgain,
     /// Replaces the disparities of the left view in the maps of the whole image by those of the right view.
     PlaceRight,
     /// Requests the maps of a view.

@@ -1,6 +1,6 @@
 //! The map of the right view, post-processed like the left one.
 
-use super::{Step, View};
+use super::{Step, View, schedule};
 use crate::plan::Plan;
 use crate::stage::Stage;
 
@@ -18,7 +18,8 @@ pub(crate) fn follow(plan: &Plan, mut steps: Vec<Step>) -> Vec<Step> {
     // Anchors are known in the left view alone.
     let refines =
         |step: &&Step| step.stage().is_some_and(|stage| stage.is_of_maps() && stage != Stage::Anchor);
-    let refining: Vec<Step> = steps.iter().filter(refines).cloned().collect();
+    let refining: Vec<Step> =
+        steps[schedule::after_looks(&steps)..].iter().filter(refines).cloned().collect();
     let collect = steps.pop();
     steps.extend(stages(plan));
     steps.extend(refining);
@@ -31,7 +32,7 @@ pub(crate) fn follow(plan: &Plan, mut steps: Vec<Step>) -> Vec<Step> {
 mod tests {
     use super::*;
     use crate::options::LeftRightCheck;
-    use crate::program::{samples, schedule};
+    use crate::program::samples;
 
     #[test]
     fn the_right_view_is_refined_like_the_left_one() {

@@ -11,51 +11,89 @@ use std::iter;
 #[must_use]
 pub(crate) fn steps(plan: &Plan) -> Vec<Step> {
     let mut steps = vec![Step::Condition, Step::Enter(0)];
-    steps.extend(estimate(plan));
+    steps.extend(looks(plan));
     steps.extend(post_processing(plan));
     steps.extend([Step::Ask(View::Left), Step::Collect]);
     steps
 }
 
-/// From a prepared pair to the disparities of the left view, and to the labels of the right view if these are
+/// From a prepared pair to the disparities of the last look.
+pub(crate) fn looks(plan: &Plan) -> Vec<Step> {
+    let mut steps = estimate(plan);
+    for look in 1..plan.looks() {
+        steps.extend(between_looks(plan));
+        steps.extend((0..plan.levels.len()).map(|z| Step::of(Stage::Guess(z))));
+        steps.extend(message_passing(plan, look));
+    }
+    steps
+}
+
+/// The first look: from a prepared pair to the disparities of the left view, and to the labels of the right view if these are
 /// computed from the beliefs.
 #[must_use]
 pub(crate) fn estimate(plan: &Plan) -> Vec<Step> {
+    look(plan, 0)
+}
+
+/// A look, counted from 0 on, at a pair that was just prepared.
+#[must_use]
+pub(crate) fn look(plan: &Plan, look: u32) -> Vec<Step> {
     let levels = 0..plan.levels.len();
     let graphs = levels.clone().filter(|&z| plan.floods(z)).map(Stage::Graph);
     let costs = levels.flat_map(|z| {
         let cost = if z == 0 { Stage::Cost } else { Stage::Pyramid(z) };
         iter::once(cost).chain(plan.limits_labels().then_some(Stage::LabelRange(z)))
     });
+    let mut steps: Vec<Step> = graphs.chain(costs).map(Step::of).collect();
+    steps.extend(message_passing(plan, look));
+    steps
+}
+
+/// The map stages between two looks: those that smooth measured pixels, and the full size, are only needed after the last one.
+pub(crate) fn between_looks(plan: &Plan) -> Vec<Step> {
+    let fills = |step: &Step| !matches!(step.stage(), Some(Stage::Median | Stage::Plane | Stage::Enlarge));
+    post_processing(plan).into_iter().filter(fills).collect()
+}
+
+/// The steps from the first map stage after the last look on.
+pub(crate) fn after_looks(steps: &[Step]) -> usize {
+    let last = steps.iter().rposition(|step| step.stage() == Some(Stage::WinnerTakesAll)).unwrap_or(0);
+    let is_of_maps = |step: &Step| step.stage().is_some_and(Stage::is_of_maps);
+    steps[last..].iter().position(is_of_maps).map_or(steps.len(), |maps| last + maps)
+}
+
+/// Message passing and read-out of a look, counted from 0 on.
+fn message_passing(plan: &Plan, look: u32) -> Vec<Step> {
     let right = plan.reads_right_view().then_some(Stage::RightView);
     let between_labels = if plan.full.is_some() { Stage::Refine } else { Stage::SubPixel };
     let read_out = iter::once(Stage::WinnerTakesAll).chain(right).chain([between_labels]);
-    let mut steps: Vec<Step> = graphs.chain(costs).map(Step::of).collect();
-    steps.extend(flood(plan, join));
+    let mut steps = flood(plan, look, |plan, z| join(plan, look, z));
     steps.extend(read_out.map(Step::of));
     steps
 }
 
-/// The steps when level `z` of `plan` joins the flooding: they set its labels and their evidence.
+/// The steps when level `z` of `plan` joins the flooding of a look: they set its labels and their evidence.
 #[must_use]
-pub fn join(plan: &Plan, z: usize) -> Vec<Step> {
-    let prior = plan.prior.then_some(Stage::Prior(z));
+pub fn join(plan: &Plan, look: u32, z: usize) -> Vec<Step> {
+    let prior = (plan.prior || look > 0).then_some(Stage::Prior(z));
     [Stage::LabelWindow(z), Stage::Evidence(z)].into_iter().chain(prior).map(Step::of).collect()
 }
 
-/// The flooding of `plan`; `join` returns the steps for each level that joins, coarsest first.
-pub fn flood(plan: &Plan, join: impl Fn(&Plan, usize) -> Vec<Step>) -> Vec<Step> {
+/// The flooding of a look, counted from 0 on, by `plan`; `join` returns the steps for each level that joins, coarsest first. Each look
+/// after the first has one iteration per phase.
+pub fn flood(plan: &Plan, look: u32, join: impl Fn(&Plan, usize) -> Vec<Step>) -> Vec<Step> {
     let mut steps = Vec::new();
     let mut joined = plan.levels.len();
-    for phase in &plan.phases {
+    let most = if look == 0 { u32::MAX } else { 1 };
+    for phase in plan.phases.iter().map(|phase| Phase { iterations: phase.iterations.min(most), ..*phase }) {
         steps.extend((phase.finest..joined).rev().flat_map(|z| join(plan, z)));
         joined = phase.finest;
-        steps.extend(joining(plan, phase).map(Step::of));
+        steps.extend(joining(plan, &phase).map(Step::of));
         let may_settle = plan.settled_change().is_some() && phase.finest == 0;
         let change = || may_settle.then_some(Step::of(Stage::Change));
         steps.extend(change());
         for i in 0..phase.iterations {
-            steps.extend(iteration(plan, phase, i).map(Step::of));
+            steps.extend(iteration(plan, &phase, i).map(Step::of));
             steps.push(Step::Iteration);
             steps.extend(change());
             steps.extend(may_settle.then_some(Step::Settled));

@@ -2,19 +2,33 @@
 
 use super::Step;
 use crate::plan::Plan;
-use crate::stage::{Data, Place, Volume};
+use crate::stage::{Data, Place, Stage, Volume};
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
-/// The steps at which each datum is needed: from the first to the last access, or, for scratch memory, single steps.
+/// The steps at which each datum is needed: from the first to the last access, or, for scratch memory, single steps. When the labels
+/// of a level are set anew, for another look, its volumes besides the costs start another life.
 fn lives(plan: &Plan, steps: &[Step]) -> HashMap<Data, Vec<RangeInclusive<usize>>> {
     let mut lives: HashMap<_, Vec<RangeInclusive<usize>>> = HashMap::new();
+    // The step at which the labels of each level were last set.
+    let mut set = vec![0; plan.levels.len()];
     for (at, step) in steps.iter().enumerate() {
         let Step::Run(run) = step else { continue };
         for stage in run.stages() {
+            if let Stage::LabelWindow(z) = stage {
+                set[z] = at;
+            }
             for data in stage.reads(plan).chain(stage.writes()) {
-                let first = lives.get(&data).map_or(at, |life| *life[0].start());
-                lives.insert(data, vec![first..=at]);
+                let since = match data {
+                    Data::Volume(Volume::Cost(_)) => 0,
+                    Data::Volume(volume) => set[volume.level()],
+                    _ => 0,
+                };
+                let lives = lives.entry(data).or_default();
+                match lives.last_mut() {
+                    Some(life) if *life.start() >= since => *life = *life.start()..=at,
+                    _ => lives.push(at..=at),
+                }
             }
             for data in stage.needs(plan) {
                 lives.entry(data).or_default().push(at..=at);
@@ -24,12 +38,13 @@ fn lives(plan: &Plan, steps: &[Step]) -> HashMap<Data, Vec<RangeInclusive<usize>
     lives
 }
 
-/// Pairs of data that may share memory: on the CPU path the costs of a level and its messages; on a device
-/// data that the table [places](Place) in other data.
+/// Pairs of data that may share memory: on the CPU path the costs of a level and its messages, unless another look needs the costs
+/// again; on a device data that the table [places](Place) in other data.
 fn pairs(plan: &Plan) -> Vec<[Data; 2]> {
     let levels = plan.levels.len();
+    let costs = if plan.looks() == 1 { 1..levels } else { 0..0 };
     let mut pairs: Vec<_> =
-        (1..levels).map(|z| [Volume::Cost(z), Volume::Dependency(z)].map(Data::Volume)).collect();
+        costs.map(|z| [Volume::Cost(z), Volume::Dependency(z)].map(Data::Volume)).collect();
     for data in Data::all(plan) {
         match data.array(plan).place {
             Place::Own => {}
@@ -56,7 +71,7 @@ pub(crate) fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
     let mut freed: HashMap<usize, Vec<Step>> = HashMap::new();
     for z in 0..plan.levels.len() {
         let graph = Data::Members(z);
-        if let Some([life]) = lives.get(&graph).map(Vec::as_slice) {
+        if let Some(life) = lives.get(&graph).and_then(|lives| lives.last()) {
             freed.entry(*life.end()).or_default().push(Step::Free(graph));
         }
     }
@@ -69,7 +84,6 @@ mod tests {
     use super::*;
     use crate::options::{DisparityRange, Method, PRESETS};
     use crate::program::schedule;
-    use crate::stage::Stage;
 
     #[test]
     fn presets_share_and_free() {
@@ -95,7 +109,10 @@ mod tests {
     /// Control: costs that are read after messages were sent do not share memory.
     #[test]
     fn control_data_needed_at_the_same_time_do_not_share() {
-        let mut plan = Plan::new(80, 60, DisparityRange::new(0, 20).unwrap(), &Method::default()).unwrap();
+        let mut method = Method::default();
+        // Several looks keep the costs apart anyway.
+        method.schedule.looks = 1;
+        let mut plan = Plan::new(80, 60, DisparityRange::new(0, 20).unwrap(), &method).unwrap();
         for late in [Stage::Evidence(1), Stage::Pyramid(2)] {
             let mut steps = schedule::steps(&plan);
             steps.push(Step::of(late));

@@ -1,38 +1,45 @@
-//! A match in tiles: the stages on volumes for each tile, then the map stages on the maps of the whole image.
+//! A match in tiles: each look takes the stages on volumes for each tile, then the map stages on the maps of the whole image.
 
 use super::tiles::Tiles;
-use super::{Frame, Program, Step, View, right_view};
+use super::{Frame, Program, Step, View, right_view, schedule};
 use crate::stage::Stage;
 
 /// The match of `program`, which is in one piece, cut into `tiles`.
 #[must_use]
 pub(crate) fn cut(program: &Program, tiles: &Tiles) -> Program {
     let [whole, ..] = &program.frames[..] else { unreachable!("a frame to match") };
-    let width = whole.plan.size().0;
+    let plan = &whole.plan;
     let mut cut = Program { frames: vec![whole.clone()], steps: vec![Step::Condition, Step::Mosaic(0)] };
-    let reads_right_view = whole.plan.reads_right_view();
-    let right_map = whole.plan.method.refinement.right_map;
     let matches = entered(program);
-    let count = matches.len() * tiles.count();
-    for (frame, steps) in matches {
-        let mirrored = program.frames[frame].mirrored;
-        for tile in tiles.list() {
-            let [crop, core] = [&tile.crop, &tile.core]
-                .map(|part| if mirrored { part.mirrored(width) } else { part.clone() });
-            cut.steps.push(Step::Enter(cut.frames.len()));
-            let place = Some((cut.frames.len(), count));
-            cut.frames.push(Frame { plan: tile.plan.clone(), crop, core, mirrored, tile: place });
-            cut.steps.extend_from_slice(steps);
-            cut.steps.push(Step::Place(if mirrored { View::Mirrored } else { View::Left }));
-            if !mirrored && right_map && reads_right_view {
-                cut.steps.extend(right_view::stages(&whole.plan));
-                cut.steps.push(Step::Place(View::Right));
+    let last = plan.looks() as usize - 1;
+    let count = (matches.len() + last) * tiles.count();
+    for look in 0..=last {
+        if look > 0 {
+            cut.steps.extend(schedule::between_looks(plan));
+            cut.steps.push(Step::LookAgain);
+        }
+        let again = schedule::look(plan, look as u32);
+        let matches = if look == 0 { &matches[..] } else { &[(0, &again[..])][..] };
+        for &(frame, steps) in matches {
+            let mirrored = program.frames[frame].mirrored;
+            for tile in tiles.list() {
+                let [crop, core] = [&tile.crop, &tile.core]
+                    .map(|part| if mirrored { part.mirrored(plan.size().0) } else { part.clone() });
+                cut.steps.push(Step::Enter(cut.frames.len()));
+                let place = Some((cut.frames.len(), count));
+                cut.frames.push(Frame { plan: tile.plan.clone(), crop, core, mirrored, tile: place });
+                cut.steps.extend_from_slice(steps);
+                cut.steps.push(Step::Place(if mirrored { View::Mirrored } else { View::Left }));
+                let right_map = plan.method.refinement.right_map && plan.reads_right_view();
+                if !mirrored && right_map && look == last {
+                    cut.steps.extend(right_view::stages(plan));
+                    cut.steps.push(Step::Place(View::Right));
+                }
             }
         }
+        cut.steps.push(Step::Gather);
     }
-    cut.steps.push(Step::Gather);
-    let first = program.steps.iter().position(is_of_maps).unwrap_or(program.steps.len());
-    for step in &program.steps[first..] {
+    for step in &program.steps[schedule::after_looks(&program.steps)..] {
         match step.stage() {
             // The tiles already have the disparities of the right view.
             Some(Stage::SubPixel | Stage::Refine) => cut.steps.push(Step::PlaceRight),
@@ -65,9 +72,9 @@ fn entered(program: &Program) -> Vec<(usize, &[Step])> {
 mod tests {
     use super::*;
     use crate::options::LeftRightCheck;
-    use crate::program::{samples, schedule, second_match};
+    use crate::program::{samples, second_match};
 
-    /// Each tile of each view is entered, estimated and placed once; then only map stages follow.
+    /// In each look, each tile of each view is entered, estimated and placed once; then only map stages follow.
     #[test]
     fn tiles_are_estimated_one_by_one_and_finished_together() {
         for check in [LeftRightCheck::RightView, LeftRightCheck::SecondMatch] {
@@ -80,29 +87,37 @@ mod tests {
             }
             whole.steps = right_view::follow(&plan, whole.steps);
             let program = cut(&whole, &tiles);
-            let count = tiles.count() * if twice { 2 } else { 1 };
-            assert!(tiles.count() > 1 && program.frames.len() == 1 + count);
+            let looks = plan.looks();
+            let count = tiles.count() * (looks as usize + usize::from(twice));
+            assert!(looks > 1 && tiles.count() > 1 && program.frames.len() == 1 + count);
 
-            let mut steps = program.steps[2..].iter();
-            let estimate = schedule::estimate(&plan);
-            for (at, frame) in program.frames.iter().enumerate().skip(1) {
-                assert_eq!(steps.next(), Some(&Step::Enter(at)));
-                assert_eq!(frame.tile, Some((at, count)));
-                assert!(estimate.iter().all(|step| steps.next() == Some(step)));
-                let view = if frame.mirrored { View::Mirrored } else { View::Left };
-                assert_eq!(steps.next(), Some(&Step::Place(view)));
-                if !twice {
-                    assert!(right_view::stages(&plan).iter().all(|step| steps.next() == Some(step)));
-                    assert_eq!(steps.next(), Some(&Step::Place(View::Right)));
+            let mut expected = program.steps[..2].to_vec();
+            let mut frames = program.frames.iter().enumerate().skip(1);
+            for look in 0..looks {
+                if look > 0 {
+                    expected.extend(schedule::between_looks(&plan));
+                    expected.push(Step::LookAgain);
                 }
+                let of_look = tiles.count() * if twice && look == 0 { 2 } else { 1 };
+                for (at, frame) in frames.by_ref().take(of_look) {
+                    assert_eq!(frame.tile, Some((at, count)));
+                    assert!(look == 0 || !frame.mirrored, "the mirrored pair is matched once");
+                    expected.push(Step::Enter(at));
+                    expected.extend(schedule::look(&plan, look));
+                    expected.push(Step::Place(if frame.mirrored { View::Mirrored } else { View::Left }));
+                    if !twice && look + 1 == looks {
+                        expected.extend(right_view::stages(&plan));
+                        expected.push(Step::Place(View::Right));
+                    }
+                }
+                expected.push(Step::Gather);
             }
             let post = schedule::post_processing(&plan);
-            let mut expected = vec![Step::Gather];
             expected.extend_from_slice(&post);
             expected.extend([Step::Ask(View::Left), Step::of(Stage::SwapViews), Step::PlaceRight]);
             expected.extend(post);
             expected.extend([Step::Ask(View::Right), Step::Collect]);
-            assert_eq!(steps.cloned().collect::<Vec<_>>(), expected);
+            assert_eq!(program.steps, expected);
         }
     }
 }

@@ -18,45 +18,63 @@ pub(crate) const BAND: usize = 32;
 /// the rows between them are held.
 #[must_use]
 pub fn streamed(plan: &Plan) -> Plan {
-    going_together(plan, &schedule::estimate(plan)).map_or_else(|| plan.clone(), |(plan, ..)| plan)
+    going_together(plan, &schedule::looks(plan)).map_or_else(|| plan.clone(), |(plan, ..)| plan)
 }
 
-/// The steps of a frame, with those on level 0 as a wavefront if possible; `plan` then holds fewer rows.
+/// The steps of a frame, with those on level 0 as a wavefront for each look, if possible; `plan` then holds fewer rows.
 #[must_use]
 pub(crate) fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
-    let Some((streamed, range, wavefront)) = going_together(plan, &steps) else { return steps };
-    let mut all = steps[..range.start].to_vec();
-    let sent = sent(plan, &steps[..range.start], &wavefront.stages);
-    all.extend(wavefront.bands().map(|(i, rows)| {
-        let band = Some(RowBand { rows, sent: sent[i] });
-        Step::Run(Run { stage: wavefront.stages[i], levels: 1, band })
-    }));
-    let markers = steps[range.clone()].iter().filter(|step| step.stage().is_none());
-    all.extend(markers.cloned());
-    all.extend_from_slice(&steps[range.end..]);
+    let Some((streamed, wavefronts)) = going_together(plan, &steps) else { return steps };
+    let mut all = Vec::new();
+    let mut done = 0;
+    for (range, wavefront) in wavefronts {
+        all.extend_from_slice(&steps[done..range.start]);
+        let sent = sent(plan, &steps[..range.start], &wavefront.stages);
+        all.extend(wavefront.bands().map(|(i, rows)| {
+            let band = Some(RowBand { rows, sent: sent[i] });
+            Step::Run(Run { stage: wavefront.stages[i], levels: 1, band })
+        }));
+        let markers = steps[range.clone()].iter().filter(|step| step.stage().is_none());
+        all.extend(markers.cloned());
+        done = range.end;
+    }
+    all.extend_from_slice(&steps[done..]);
     *plan = streamed;
     all
 }
 
-/// The plan with fewer rows, the steps of the wavefront, and the wavefront; `None` if impossible or without savings.
-fn going_together(plan: &Plan, steps: &[Step]) -> Option<(Plan, Range<usize>, Wavefront)> {
-    let start = steps.iter().position(|step| step.stage() == Some(Stage::Evidence(0)))?;
+/// The steps that a wavefront takes the place of, and the wavefront.
+type Placed = (Range<usize>, Wavefront);
+
+/// The plan with fewer rows, and the wavefront of each look; `None` if impossible or without savings.
+fn going_together(plan: &Plan, steps: &[Step]) -> Option<(Plan, Vec<Placed>)> {
     let by_rows = |step: &Step| step.stage().map_or(*step == Step::Iteration, goes_by_rows);
-    let end = start + steps[start..].iter().position(|step| !by_rows(step)).unwrap_or(steps.len() - start);
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for (start, step) in steps.iter().enumerate() {
+        if step.stage() == Some(Stage::Evidence(0)) {
+            ranges.push(start..start + steps[start..].iter().take_while(|step| by_rows(step)).count());
+        }
+    }
     // No other step may need level 0, and its costs are computed where they are needed.
     let cost = Data::Volume(Volume::Cost(0));
     let needs_whole = |stage: Stage| {
         stage.needs_level_0(plan) || (stage != Stage::Cost && stage.writes().any(|data| data == cost))
     };
-    let outside = steps[..start].iter().chain(&steps[end..]).filter_map(Step::stage);
+    let mut outside =
+        steps.iter().enumerate().filter(|(at, _)| !ranges.iter().any(|range| range.contains(at)));
     // If all levels join at once, the lags of their many iterations would cover all rows.
-    if plan.phases.len() == 1 || !plan.costs_go_by_rows() || outside.into_iter().any(needs_whole) {
+    let prevents = |step: &Step| step.stage().is_some_and(needs_whole);
+    if plan.phases.len() == 1 || !plan.costs_go_by_rows() || outside.any(|(_, step)| prevents(step)) {
         return None;
     }
-    let wavefront = Wavefront::new(plan, steps[start..end].iter().filter_map(Step::stage));
-    let streamed = Plan { held: wavefront.rows(), ..plan.clone() };
+    let wavefront = |range: Range<usize>| {
+        (range.clone(), Wavefront::new(plan, steps[range].iter().filter_map(Step::stage)))
+    };
+    let wavefronts: Vec<_> = ranges.into_iter().map(wavefront).collect();
+    let held = wavefronts.iter().map(|(_, wavefront)| wavefront.rows()).max()?;
+    let streamed = Plan { held, ..plan.clone() };
     // With few labels, costs are smaller than the data that they are computed from.
-    (streamed.bytes() < plan.bytes()).then_some((streamed, start..end, wavefront))
+    (streamed.bytes() < plan.bytes()).then_some((streamed, wavefronts))
 }
 
 /// Whether `stage`, or each of its parts, can run on a band of rows.

@@ -287,7 +287,7 @@ impl Data {
             Self::FullWindows(z) => windows("full_windows", z).starting(Constant),
             Self::Candidates(z) => level("candidates", z, 1),
             Self::LabelRange(z) => level("label_range", z, 1).starting(Given),
-            Self::Prior(z) => level("prior", z, 2).starting(Given),
+            Self::Prior(z) => level("prior", z, 2).starting(if plan.prior { Given } else { Anything }),
             Self::Right => fine("right", 4).starting(Given),
             Self::LeftWords => fine("left_words", 1).starting(Given).place(Place::In(Self::NextDisparity)),
             Self::RightWords => fine("right_words", 1).starting(Given).place(Place::In(Self::NextFlags)),
@@ -476,7 +476,7 @@ impl Data {
             Self::Volume(volume) => volume.is_there(levels),
             Self::NextGuide(z) | Self::Candidates(z) => (1..levels).contains(&z),
             Self::LabelRange(z) => z < levels && plan.limits_labels(),
-            Self::Prior(z) => z < levels && plan.prior,
+            Self::Prior(z) => z < levels && plan.has_priors(),
             Self::Map(Map::Anchor) => plan.prior,
             Self::LeftWords | Self::RightWords => plan.full.is_none(),
             Self::FullLeft

@@ -129,10 +129,10 @@ impl MapSet {
     /// Takes the anchors of a prior, if there is one, and returns its levels.
     pub(crate) fn take_prior(&mut self, prior: Option<LevelPriors>) -> Vec<Plane<LabelPrior>> {
         self.anchors.data_mut().fill(NO_ANCHOR);
-        let Some(LevelPriors { levels, anchors }) = prior.filter(|_| !self.anchors.data().is_empty()) else {
-            return Vec::new();
-        };
-        self.anchors = anchors;
+        let Some(LevelPriors { levels, anchors }) = prior else { return Vec::new() };
+        if !self.anchors.data().is_empty() {
+            self.anchors = anchors;
+        }
         levels
     }
 

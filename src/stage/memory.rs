@@ -59,7 +59,7 @@ impl Plan {
             l.height * (2 * l.width + 24 * (l.width + 2 * l.stride))
         };
         // The member codes, the transposed table with its row starts, and the guide.
-        let prior = if self.prior { size_of::<LabelPrior>() } else { 0 };
+        let prior = if self.has_priors() { size_of::<LabelPrior>() } else { 0 };
         let on_host = l.width * (self.neighbours + 4 * self.slots() + 4 + 9 + prior);
         // A device needs less for these, but also keeps candidates and label ranges.
         let of_level = Data::of_levels(level).into_iter().chain(Data::of_level(level));
@@ -162,7 +162,9 @@ impl Plan {
         // The host frees the votes before it carries planes.
         let filling = self.vote_bytes().max(self.patch_bytes());
         let anchors = if self.prior { 4 } else { 0 };
-        (20 + 12 + corrected + right + full + anchors) * self.levels[0].pixels() as u64 + filling
+        // Disparities and validity of the last look.
+        let guess = if self.looks() > 1 { 5 } else { 0 };
+        (20 + 12 + corrected + right + full + anchors + guess) * self.levels[0].pixels() as u64 + filling
     }
 
     /// Bytes of all volumes, graphs and maps.

@@ -28,7 +28,7 @@ macro_rules! for_every_stage {
     ($then:ident) => {
         $then! {
             levels {
-                Graph graph; Pyramid pyramid; LabelRange label_range; LabelWindow label_window; Flood flood;
+                Graph graph; Pyramid pyramid; LabelRange label_range; LabelWindow label_window; Flood flood; Guess guess;
             }
             level_rows { Evidence evidence; Prior prior; Dependency dependency; Resolution resolution; Belief belief; }
             finest { Cost cost; Change change; Refine refine; SwapViews swap_views; MirrorLabels mirror_labels; }
@@ -119,7 +119,9 @@ macro_rules! define {
                 let is_there = |stage: &Self| match stage {
                     Self::Pyramid(z) | Self::Resolution(z) => *z > 0,
                     Self::LabelRange(_) => plan.limits_labels(),
-                    Self::Prior(_) | Self::Anchor => plan.prior,
+                    Self::Prior(_) => plan.has_priors(),
+                    Self::Guess(_) => plan.looks() > 1,
+                    Self::Anchor => plan.prior,
                     Self::Refine | Self::Enlarge => plan.full.is_some(),
                     _ => true,
                 };
@@ -188,7 +190,9 @@ for_every_stage!(define);
 impl Stage {
     /// The data that it reads, if they exist in `plan`.
     pub fn reads(self, plan: &Plan) -> impl Iterator<Item = Data> + use<'_> {
-        self.of_plan(self.descriptor().reads, plan)
+        // Before the first guess, only a prior from elsewhere is there.
+        let is_there = move |data: &Data| plan.prior || (self, *data) != (Self::Guess(0), Data::Prior(0));
+        self.of_plan(self.descriptor().reads, plan).filter(is_there)
     }
 
     /// The data that it writes.

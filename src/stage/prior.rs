@@ -42,14 +42,20 @@ impl LabelPrior {
     /// A label, in the fraction of `lo` and `hi`.
     pub(crate) const LABEL: i32 = 1 << PRIOR_LABEL_BITS;
 
-    /// Two words for a device: `lo` and `hi` plus one label in 20 bits each, `slope` in 12, `cap` in 8. Intervals that begin or
-    /// end more than a label outside the `labels` of the level are cut there.
+    /// This prior with an interval that begins and ends at most a label outside the `labels` of the level.
+    #[must_use]
+    pub fn cut(self, labels: usize) -> Self {
+        let end = |label: i32| label.clamp(-Self::LABEL, labels as i32 * Self::LABEL);
+        Self { lo: end(self.lo), hi: end(self.hi), ..self }
+    }
+
+    /// Two words for a device: `lo` and `hi` plus one label in 20 bits each, `slope` in 12, `cap` in 8, after a [cut](Self::cut) to
+    /// the `labels` of the level.
     #[must_use]
     pub fn words(self, labels: usize) -> [u32; 2] {
-        let end = |label: i32| {
-            (label.clamp(-Self::LABEL, labels as i32 * Self::LABEL) + Self::LABEL).cast_unsigned()
-        };
-        [end(self.lo) | self.slope.min(PRIOR_SLOPE_MOST) << 20, end(self.hi) | u32::from(self.cap) << 20]
+        let Self { lo, hi, slope, cap } = self.cut(labels);
+        let end = |label: i32| (label + Self::LABEL).cast_unsigned();
+        [end(lo) | slope.min(PRIOR_SLOPE_MOST) << 20, end(hi) | u32::from(cap) << 20]
     }
 
     /// The cost of label `k` by these words, in units.

@@ -42,12 +42,12 @@ pub fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, graphs: &[Le
 
 /// Runs the message passing of `plan` on the evidence in `backend`; returns the number of iterations.
 pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
-    run(backend, &schedule::flood(plan, |_, _| Vec::new()))
+    run(backend, &schedule::flood(plan, 0, |_, _| Vec::new()))
 }
 
 /// Like [`flood`], from the costs in `backend`.
 pub fn flood_on_costs(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
-    run(backend, &schedule::flood(plan, schedule::join))
+    run(backend, &schedule::flood(plan, 0, |plan, z| schedule::join(plan, 0, z)))
 }
 
 /// Runs steps of message passing; returns the number of iterations.

@@ -10,7 +10,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::stage::{LabelPrior, LevelPriors, NO_ANCHOR};
 
 /// Random priors of all kinds: nothing known, sharp and flat ones, also far outside the labels.
-fn random_prior(random: &mut Random, plan: &Plan, z: usize) -> Plane<LabelPrior> {
+pub(super) fn random_prior(random: &mut Random, plan: &Plan, z: usize) -> Plane<LabelPrior> {
     let l = &plan.levels[z];
     let most = 32 * l.labels as u32 + 200;
     Plane::from_fn(l.width, l.height, |_, _| {

@@ -415,7 +415,7 @@ fn json_describes_the_match_and_its_result() {
     assert_eq!(found["method"], serde_json::to_value(Method::default()).unwrap());
     assert_eq!(found["ran_on"], "the CPU path, 1 thread");
     assert_eq!([&found["driver"], &found["note"]], [&Value::Null; 2]);
-    assert_eq!([&found["tiles"], &found["iterations"]], [1, 16]);
+    assert_eq!([&found["tiles"], &found["iterations"]], [1, 22]);
     let seconds = found["seconds"].as_f64().unwrap();
     assert!(seconds > 0.0 && told.stderr.contains(&format!("in {seconds:.2} s")), "{}", told.stderr);
     assert!(found["stages"].is_null(), "only `inspect` times stages");

@@ -62,6 +62,14 @@ impl Cpu {
     pub(crate) fn of_maps(plan: &Plan, pair: Pair, maps: MapSet) -> Self {
         Self { state: Some(State::Narrow(Volumes::of_maps(plan, pair, maps))), ..Self::default() }
     }
+
+    /// The pair and its maps.
+    pub(crate) fn into_maps(self) -> (Pair, MapSet) {
+        match self.state.expect("maps of a match") {
+            State::Narrow(volumes) => (volumes.pair, volumes.maps),
+            State::Wide(volumes) => (volumes.pair, volumes.maps),
+        }
+    }
 }
 
 impl Backend for Cpu {

@@ -46,7 +46,7 @@ pub(super) struct Level<U> {
     /// The image that the graph was chosen by; `None` at level 0, whose guide is the left image.
     pub(super) guide: Option<Image>,
     pub(super) windows: Windows,
-    /// In 1/256 cost units; empty at level 0, and once messages are sent in memory that it [shares](Plan::shares).
+    /// In 1/256 cost units; empty at level 0, and once messages are sent in memory that they [share](Plan::costs_share).
     pub(super) cost: Pages<u16>,
     pub(super) evidence: Pages<u8>,
     pub(super) dependency: Pages<U>,
@@ -70,10 +70,10 @@ impl<U: Units> Volumes<U> {
                 let cells = Windows::most_cells(level, held);
                 let cost = if z == 0 { 0 } else { level.pixels() * level.stride };
                 // Costs are in the memory of the messages until these are sent.
-                let shared = if plan.shares { (2 * cost).div_ceil(size_of::<U>()) } else { 0 };
+                let shared = if plan.costs_share() { (2 * cost).div_ceil(size_of::<U>()) } else { 0 };
                 Ok(Level {
                     windows: Windows::full(level, held),
-                    cost: Pages::new(if plan.shares { 0 } else { cost })?,
+                    cost: Pages::new(if plan.costs_share() { 0 } else { cost })?,
                     evidence: Pages::new(cells)?,
                     dependency: Pages::new(shared.max(cells * plan.slots()))?,
                     down: Pages::new(if z == last { 0 } else { cells })?,
@@ -120,7 +120,7 @@ impl<U: Units> Volumes<U> {
 
     /// Moves shared memory to the volume that `stage` writes.
     pub(super) fn make_room(&mut self, stage: Stage) {
-        for volume in stage.writes().filter_map(Data::volume).filter(|_| self.plan.shares) {
+        for volume in stage.writes().filter_map(Data::volume).filter(|_| self.plan.costs_share()) {
             let Level { cost, dependency, .. } = &mut self.levels[volume.level()];
             match volume {
                 Volume::Cost(1..) if cost.is_empty() => *cost = mem::take(dependency).of_others(),

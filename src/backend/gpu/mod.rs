@@ -290,7 +290,8 @@ impl Gpu {
             array(Data::LabelRange(z))
                 .write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
         }
-        for (z, l) in plan.levels.iter().enumerate().filter(|_| plan.prior) {
+        let knows = plan.prior || prepared.prior.is_some();
+        for (z, l) in plan.levels.iter().enumerate().filter(|_| knows && plan.has_priors()) {
             let words = |prior: &Plane<_>| prior_words(prior, l.labels, &buffers.levels[z]);
             let nothing = || words(&Plane::filled(l.width, l.height, LabelPrior::default()));
             let levels = prepared.prior.as_ref().map(|prior| words(&prior.levels[z]));

@@ -2,10 +2,11 @@
 
 use super::ReadyPrior;
 use crate::image::Plane;
-use crate::maps::FRACTION;
+use crate::maps::{FRACTION, is_filled};
 use crate::plan::{LevelPlan, PRIOR_SLOPE_BITS, PRIOR_SLOPE_MOST, Plan, UNITS_PER_NAT};
 use crate::prior::PriorKind;
 use crate::stage::NO_ANCHOR;
+use crate::stage::guess::{GUESS_CAP, GUESS_SLOPE};
 use crate::stage::prior::{LabelPrior, LevelPriors};
 use crate::threads::prelude::*;
 
@@ -18,12 +19,31 @@ const ANCHOR_SIGMA: u16 = 11 * FRACTION as u16 / 4;
 
 /// The prior of each pixel for all levels of `plan`.
 pub(crate) fn levels(ready: &ReadyPrior, plan: &Plan) -> LevelPriors {
-    let mut levels = vec![finest(ready, &plan.levels[0])];
+    LevelPriors { levels: all(finest(ready, &plan.levels[0]), plan), anchors: anchors(ready) }
+}
+
+/// The prior of each pixel, if `known` before, with the filled disparities of a look. `guess` is its disparity and validity.
+pub(crate) fn with_guess(
+    known: Option<LevelPriors>,
+    (disparity, validity): (&Plane<i32>, &Plane<u8>),
+    plan: &Plan,
+) -> LevelPriors {
+    let nothing = Plane::filled(0, 0, LabelPrior::default());
+    let finer = known.as_ref().map_or(&nothing, |known| &known.levels[0]);
+    let levels = all(guessed(disparity, validity, finer, &plan.levels[0]), plan);
+    let (width, height) = disparity.size();
+    let anchors = known.map_or_else(|| Plane::filled(width, height, NO_ANCHOR), |known| known.anchors);
+    LevelPriors { levels, anchors }
+}
+
+/// The priors of all levels from that of the `finest` one.
+fn all(finest: Plane<LabelPrior>, plan: &Plan) -> Vec<Plane<LabelPrior>> {
+    let mut levels = vec![finest];
     for z in 1..plan.levels.len() {
         let coarse = coarser(&levels[z - 1], &plan.levels[z], plan.label_offset(z));
         levels.push(coarse);
     }
-    LevelPriors { levels, anchors: anchors(ready) }
+    levels
 }
 
 /// The prior of the labels of level 0: nothing is known of pixels whose disparity is more than a label outside the range.
@@ -40,7 +60,7 @@ fn finest(ready: &ReadyPrior, level: &LevelPlan) -> Plane<LabelPrior> {
         let dead = if known.kind == PriorKind::Points { POINT_DEAD } else { sigma.into() };
         // In fractions of a label.
         let label = |end: i32| (end - level.min * FRACTION) * LabelPrior::LABEL / FRACTION;
-        *prior = LabelPrior {
+        let label_prior = LabelPrior {
             lo: label(disparity - dead),
             hi: label(disparity + dead),
             slope: ((UNITS_PER_NAT as u32 * FRACTION as u32) << PRIOR_SLOPE_BITS)
@@ -48,14 +68,40 @@ fn finest(ready: &ReadyPrior, level: &LevelPlan) -> Plane<LabelPrior> {
                 .min(PRIOR_SLOPE_MOST),
             cap,
         };
+        *prior = label_prior.cut(level.labels);
     });
     finest
+}
+
+/// The prior of level 0 that the filled pixels of a look give, and those `known` from elsewhere, if any: the level 0 of
+/// [`Stage::Guess`](crate::stage::Stage::Guess).
+pub(crate) fn guessed(
+    disparity: &Plane<i32>,
+    validity: &Plane<u8>,
+    known: &Plane<LabelPrior>,
+    level: &LevelPlan,
+) -> Plane<LabelPrior> {
+    let (width, height) = disparity.size();
+    let mut guessed = Plane::filled(width, height, LabelPrior::default());
+    guessed.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        for (prior, (&d, &flags)) in row.iter_mut().zip(disparity.row(y).iter().zip(validity.row(y))) {
+            if is_filled(flags) {
+                let at = (d - level.min * FRACTION).div_euclid(FRACTION / LabelPrior::LABEL);
+                *prior = LabelPrior { lo: at, hi: at, slope: GUESS_SLOPE, cap: GUESS_CAP }.cut(level.labels);
+            }
+        }
+        if !known.data().is_empty() {
+            let known = known.row(y).iter().zip(row).filter(|(known, _)| known.cap > GUESS_CAP);
+            known.for_each(|(known, prior)| *prior = known.cut(level.labels));
+        }
+    });
+    guessed
 }
 
 /// The prior of a level from that of the next finer one: the smallest interval that holds those of all known children, with twice
 /// their mean slope, because a label is twice as wide, and their mean cap. Coarse label k stands for fine labels
 /// 2 k + `offset` - 1 ..= 2 k + `offset` + 1.
-fn coarser(fine: &Plane<LabelPrior>, level: &LevelPlan, offset: i32) -> Plane<LabelPrior> {
+pub(crate) fn coarser(fine: &Plane<LabelPrior>, level: &LevelPlan, offset: i32) -> Plane<LabelPrior> {
     let (width, height) = fine.size();
     let mut coarse = Plane::filled(level.width, level.height, LabelPrior::default());
     coarse.data_mut().par_chunks_mut(level.width).enumerate().for_each(|(y, row)| {
@@ -76,7 +122,8 @@ fn coarser(fine: &Plane<LabelPrior>, level: &LevelPlan, offset: i32) -> Plane<La
                 hi: -(-(hi - shift + LabelPrior::LABEL)).div_euclid(2),
                 slope: slope.min(PRIOR_SLOPE_MOST),
                 cap: (cap / count) as u8,
-            };
+            }
+            .cut(level.labels);
         }
     });
     coarse

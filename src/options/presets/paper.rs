@@ -37,6 +37,7 @@ impl Method {
             schedule: ScheduleOptions {
                 order: Order::Together,
                 iterations: 30,
+                looks: 1,
                 tolerance: 0.1,
                 ..ScheduleOptions::default()
             },

@@ -40,10 +40,15 @@ impl Steps {
 
     fn show(&mut self, inspection: &mut Inspection) -> Result<()> {
         match inspection {
-            Inspection::Prepared(prepared) => self.prepared(prepared),
+            Inspection::Prepared(prepared) => {
+                // A match starts, perhaps again after the device failed.
+                (self.changes, self.last) = ("iteration,rms_change_px\n".into(), None);
+                self.prepared(prepared)
+            }
             Inspection::Stage(backend, Stage::Graph(z)) => self.degree(*z, &backend.probe().graph(*z)?),
             Inspection::Stage(backend, Stage::Evidence(z)) => {
                 if *z == 0 {
+                    // Level 0 joins, in each look.
                     self.change(*backend, 0)?;
                 }
                 self.slices(*backend, *z)
@@ -164,10 +169,9 @@ impl Steps {
     fn change(&mut self, backend: &mut dyn Backend, iteration: u32) -> Result<()> {
         let belief = backend.probe().read(Volume::Belief(0))?;
         let map: Vec<usize> = belief.chunks_exact(self.plan.levels[0].labels).map(optimum).collect();
-        if iteration == 0 {
-            // A match starts, perhaps again after the device failed.
-            self.changes = "iteration,rms_change_px\n".into();
-        } else if let Some(last) = &self.last {
+        if iteration > 0
+            && let Some(last) = &self.last
+        {
             let squares: f64 = map.iter().zip(last).map(|(&a, &b)| (a.abs_diff(b) as f64).powi(2)).sum();
             let rms = (squares / map.len() as f64).sqrt();
             let _ = writeln!(self.changes, "{iteration},{rms:.6}");

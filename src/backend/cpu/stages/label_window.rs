@@ -1,5 +1,6 @@
 //! Label windows: see [`crate::backend::Stage::LabelWindow`].
 
+use crate::backend::Stage;
 use crate::backend::cpu::units::{Units, smallest};
 use crate::backend::cpu::volumes::Volumes;
 use crate::backend::cpu::windows::Windows;
@@ -10,6 +11,7 @@ use crate::plan::{
 use crate::threads::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    v.begin(Stage::LabelWindow(level));
     let (l, held) = (&v.plan.levels[level], v.plan.rows_held(level));
     v.levels[level].windows = if v.plan.windows_follow_beliefs(level) {
         let candidates = candidates(v, level + 1);

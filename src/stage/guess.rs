@@ -1,0 +1,43 @@
+//! Takes what a look has filled in as a weak prior for the next look.
+//!
+//! At level 0, the [`Prior`](Data::Prior) of a pixel that has a flag of [`INVALID`](crate::maps::flag::INVALID) and
+//! [`FILLED`](crate::maps::flag::FILLED), with its disparity D and the smallest disparity low of the level:
+//!
+//! ```text
+//! lo = hi = (D - 256 low) >> 3       slope = GUESS_SLOPE       cap = GUESS_CAP
+//! ```
+//!
+//! Nothing is known of all other pixels. Where something is known from elsewhere, with a larger cap, it stays.
+//!
+//! At a coarser level, the prior of a pixel is that of its known children in the next finer level, up to 2 x 2 inside the image: the
+//! smallest interval that holds theirs, with the offset o, 2 low - (low of the finer level), and F = 32, the fractions of a label.
+//! Nothing is known without such children.
+//!
+//! ```text
+//! lo    = floor((smallest lo - F o - F) / 2)          cut to -F ..= F labels, like hi
+//! hi    = ceil((largest hi - F o + F) / 2)
+//! slope = min(2 (sum of slopes) / n, 4095)            rounded down, n children
+//! cap   = (sum of caps) / n                           rounded down
+//! ```
+//!
+//! Smoothing ([`median`](super::median), [`plane`](super::plane)) is left out between two looks: the guesses become no better by it.
+//!
+//! (A match cannot decide where a surface is hidden or plain; what was filled in from its surroundings often can. A prior of one nat
+//! loses against any clear match, so that the next look corrects wrong guesses, and its messages carry right ones farther.)
+
+use super::{Data, Descriptor, Map, maps};
+
+/// The largest cost of a guess: one nat.
+pub(crate) const GUESS_CAP: u8 = 4;
+/// The cost of a guess per label, in 1/16 unit: one nat.
+pub(crate) const GUESS_SLOPE: u32 = 64;
+
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |z| match z.checked_sub(1) {
+        None => [maps(&[Map::Disparity, Map::Validity]), vec![Data::Prior(0)]].concat(),
+        Some(finer) => vec![Data::Prior(finer)],
+    },
+    writes: |z| vec![Data::Prior(z)],
+    pixel: 4.0,
+    ..Descriptor::NONE
+};
