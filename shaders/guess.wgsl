@@ -44,7 +44,7 @@ fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     prior[at] = guess_of(at);
 }
 
-// Like `take`, where nothing is known from elsewhere.
+// Takes the guess where no prior of the caller is known, which has a larger cap.
 @compute @workgroup_size(GROUP)
 fn take_unknown(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);

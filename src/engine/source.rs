@@ -83,7 +83,7 @@ impl Source {
         Some(front::prior::with_guess(known, guess, &frame.plan))
     }
 
-    /// What was known of the pixels of `frame` before the match, in the labels of its levels.
+    /// The prior that the caller gave, for the pixels of `frame` and in the labels of its levels.
     fn known_of(&self, frame: &Frame) -> Option<LevelPriors> {
         let ready = self.prior.as_ref().filter(|_| frame.plan.prior)?;
         if frame.tile.is_none() && !frame.mirrored {

@@ -2,9 +2,9 @@
 
 use crate::common::random::Random;
 use crate::common::twin;
-use crate::{on_all, random_cost, same};
+use crate::{Case, on_all, random_cost, same};
 use mrfgs::image::Plane;
-use mrfgs::low_level::backend::{Stage, Volume};
+use mrfgs::low_level::backend::{Backend, Stage, Volume};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::stage::{LabelPrior, LevelPriors, NO_ANCHOR};
@@ -28,6 +28,33 @@ pub(super) fn random_prior(random: &mut Random, plan: &Plan, z: usize) -> Plane<
     })
 }
 
+/// Runs the stage at level `z` on random costs, and compares it with the twin, which takes this `prior`.
+pub(super) fn check(
+    case: &Case,
+    plan: &Plan,
+    backend: &mut dyn Backend,
+    random: &mut Random,
+    z: usize,
+    prior: &Plane<LabelPrior>,
+) -> Result<(), String> {
+    backend.probe().set_windows(z, &case.windows[z]).unwrap();
+    let has = twin::label_window::ranges(plan, z, &case.windows[z]);
+    backend.probe().write(Volume::Cost(z), &random_cost(random, plan, z)).unwrap();
+    backend.run(Stage::Evidence(z)).unwrap();
+    let evidence = backend.probe().read(Volume::Evidence(z)).unwrap();
+    backend.run(Stage::Prior(z)).unwrap();
+    let expected = twin::prior::prior(plan, z, &has, prior, &evidence);
+    same(plan, backend, Volume::Evidence(z), &expected)?;
+    same(plan, backend, Volume::Belief(z), &twin::evidence::beliefs(plan, &expected))?;
+    // Control: without a prior, the evidence is another.
+    let nothing = Plane::filled(plan.levels[z].width, plan.levels[z].height, LabelPrior::default());
+    let without = twin::prior::prior(plan, z, &has, &nothing, &evidence);
+    if without != expected {
+        assert!(same(plan, backend, Volume::Evidence(z), &without).is_err());
+    }
+    Ok(())
+}
+
 #[test]
 fn prior() {
     on_all(|case, backend, random| {
@@ -38,21 +65,7 @@ fn prior() {
         let prior = Some(LevelPriors { levels: levels.clone(), anchors });
         backend.prepare(&plan, Prepared { prior, ..Prepared::new(&case.pair) }).unwrap();
         for (z, prior) in levels.iter().enumerate() {
-            backend.probe().set_windows(z, &case.windows[z]).unwrap();
-            let has = twin::label_window::ranges(&plan, z, &case.windows[z]);
-            backend.probe().write(Volume::Cost(z), &random_cost(random, &plan, z)).unwrap();
-            backend.run(Stage::Evidence(z)).unwrap();
-            let evidence = backend.probe().read(Volume::Evidence(z)).unwrap();
-            backend.run(Stage::Prior(z)).unwrap();
-            let expected = twin::prior::prior(&plan, z, &has, prior, &evidence);
-            same(&plan, backend, Volume::Evidence(z), &expected)?;
-            same(&plan, backend, Volume::Belief(z), &twin::evidence::beliefs(&plan, &expected))?;
-            // Control: without a prior, the evidence is another.
-            let nothing = Plane::filled(plan.levels[z].width, plan.levels[z].height, LabelPrior::default());
-            let without = twin::prior::prior(&plan, z, &has, &nothing, &evidence);
-            if without != expected {
-                assert!(same(&plan, backend, Volume::Evidence(z), &without).is_err());
-            }
+            check(case, &plan, backend, random, z, prior)?;
         }
         Ok(())
     });

@@ -144,7 +144,7 @@ fn methods_are_compared_side_by_side() {
     // Control: the methods differ.
     assert_ne!(alone[0]["mean"], alone[1]["mean"]);
 
-    // What the methods share is there once, then each kind of map is there by one and by the other.
+    // The page shows pictures that all methods share once. Then each kind of map follows, first by `paper`, then by `fgs`.
     let page = fs::read_to_string(at("out/index.html")).unwrap();
     let mut expected: Vec<_> =
         ["left", "zones", "truth"].iter().map(|kind| format!("1-Teddy-{kind}.png")).collect();

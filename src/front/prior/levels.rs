@@ -22,7 +22,8 @@ pub(crate) fn levels(ready: &ReadyPrior, plan: &Plan) -> LevelPriors {
     LevelPriors { levels: all(finest(ready, &plan.levels[0]), plan), anchors: anchors(ready) }
 }
 
-/// The prior of each pixel, if `known` before, with the filled disparities of a look. `guess` is its disparity and validity.
+/// The prior of each pixel after a look with these disparity and validity maps: what is `known` from the caller, and the filled
+/// disparities.
 pub(crate) fn with_guess(
     known: Option<LevelPriors>,
     (disparity, validity): (&Plane<i32>, &Plane<u8>),
@@ -60,15 +61,15 @@ fn finest(ready: &ReadyPrior, level: &LevelPlan) -> Plane<LabelPrior> {
         let dead = if known.kind == PriorKind::Points { POINT_DEAD } else { sigma.into() };
         // In fractions of a label.
         let label = |end: i32| (end - level.min * FRACTION) * LabelPrior::LABEL / FRACTION;
-        let label_prior = LabelPrior {
+        *prior = LabelPrior {
             lo: label(disparity - dead),
             hi: label(disparity + dead),
             slope: ((UNITS_PER_NAT as u32 * FRACTION as u32) << PRIOR_SLOPE_BITS)
                 .div_ceil(sigma.into())
                 .min(PRIOR_SLOPE_MOST),
             cap,
-        };
-        *prior = label_prior.cut(level.labels);
+        }
+        .cut(level.labels);
     });
     finest
 }

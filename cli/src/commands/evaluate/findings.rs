@@ -9,7 +9,7 @@ use crate::table::Table;
 /// The figures of all pairs, with method and device.
 #[derive(Serialize)]
 pub(super) struct Findings {
-    /// What `--method` calls the method; `None` for the only one.
+    /// The preset or file by which `--method` names the method; `None` if only one method is evaluated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) name: Option<String>,
     pub(super) method: Option<Method>,

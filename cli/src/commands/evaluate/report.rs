@@ -77,7 +77,7 @@ fn refuse_strangers(staged: &StagedFolder) -> mrfgs::Result<()> {
 }
 
 /// A picture of a pair, as PNG.
-pub(super) struct Picture {
+struct Picture {
     /// The end of the file name.
     file: &'static str,
     title: &'static str,
@@ -106,9 +106,9 @@ impl Picture {
 /// The pictures of one pair.
 #[derive(Default)]
 pub(super) struct Pictures {
-    /// Those that do not depend on the method.
+    /// The views and the ground truth: pictures that are the same for all methods.
     shared: Vec<Picture>,
-    /// Those of each method: the same kinds in the same order.
+    /// For each method, the pictures of its maps. All methods have the same kinds of pictures in the same order.
     own: Vec<Vec<Picture>>,
 }
 
