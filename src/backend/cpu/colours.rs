@@ -18,18 +18,23 @@ pub(super) fn mean_colours(image: &Image, side: usize) -> Plane<[u8; 3]> {
     let (width, height) = image.pixels.size();
     let mut means = Plane::filled(width.div_ceil(side), height.div_ceil(side), [0; 3]);
     let rows = means.data_mut().par_chunks_mut(width.div_ceil(side)).enumerate();
-    rows.for_each(|(y, out)| {
-        for (x, out) in out.iter_mut().enumerate() {
-            let (mut sums, mut count) = ([0; 3], 0);
-            for y in side * y..height.min(side * (y + 1)) {
-                for x in (side * x..width.min(side * (x + 1))).filter(|&x| !image.masked[(x, y)]) {
-                    let pixel = channels(image.pixels[(x, y)]);
-                    sums.iter_mut().zip(pixel).for_each(|(sum, c)| *sum += u32::from(c));
-                    count += 1;
+    rows.for_each_init(Vec::new, |sums: &mut Vec<[u16; 4]>, (y, out)| {
+        sums.clear();
+        sums.resize(out.len(), [0; 4]);
+        for y in side * y..height.min(side * (y + 1)) {
+            let blocks = image.pixels.row(y).chunks(side).zip(image.masked.row(y).chunks(side));
+            for (sum, (pixels, masked)) in sums.iter_mut().zip(blocks) {
+                for (pixel, &masked) in pixels.iter().zip(masked) {
+                    let seen = u16::from(!masked);
+                    // The last entry counts pixels.
+                    let [r, g, b, _] = pixel.map(|channel| (channel >> 8) * seen);
+                    *sum = [sum[0] + r, sum[1] + g, sum[2] + b, sum[3] + seen];
                 }
             }
+        }
+        for (out, &[r, g, b, count]) in out.iter_mut().zip(&*sums) {
             if count > 0 {
-                *out = sums.map(|sum| ((2 * sum + count) / (2 * count)) as u8);
+                *out = [r, g, b].map(|sum| ((2 * sum + count) / (2 * count)) as u8);
             }
         }
     });

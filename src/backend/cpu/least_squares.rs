@@ -158,11 +158,11 @@ impl Planes {
 
 /// A positive divisor as a float, since vectors have no integer division.
 #[derive(Clone, Copy)]
-struct Divisor(f64);
+pub(super) struct Divisor(f64);
 
 impl Divisor {
     #[inline(always)]
-    fn new(divisor: i32) -> Self {
+    pub(super) fn new(divisor: i32) -> Self {
         // So far above 1 that no exact quotient is rounded below itself, and so near that no other becomes exact.
         const ONE: f64 = 1.0 + 4.0 * f64::EPSILON;
         Self(ONE / f64::from(divisor))
@@ -170,7 +170,7 @@ impl Divisor {
 
     /// The quotient, rounded towards 0.
     #[inline(always)]
-    fn divide(self, number: i32) -> i32 {
+    pub(super) fn divide(self, number: i32) -> i32 {
         // Adding this puts an integer into the lower bits of the sum.
         const WHOLE: f64 = 1.5 * (1u64 << 52) as f64;
         ((f64::from(number) * self.0).trunc() + WHOLE).to_bits() as i32

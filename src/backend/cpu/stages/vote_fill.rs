@@ -1,6 +1,7 @@
 //! Fills by votes: see [`crate::backend::Stage::VoteFill`].
 
 use crate::backend::cpu::colours::{channels, difference, mean_colours};
+use crate::backend::cpu::pages::Pages;
 use crate::backend::cpu::units::{block, each_lane};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::{FRACTION, flag, is_filled};
@@ -63,8 +64,11 @@ fn around(at: usize, count: usize) -> std::ops::Range<usize> {
     (at / 2).saturating_sub(1)..(at / 2 + 2).min(count)
 }
 
-/// The votes of the half-size pixels that are needed, in 1/256 px, or `None`.
-fn elect(maps: &MapSet, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> Plane<Option<i32>> {
+/// The place of a vote that does not exist.
+const NO_VOTE: i32 = i32::MIN;
+
+/// The votes of the half-size pixels that are needed, in 1/256 px, or [`NO_VOTE`].
+fn elect(maps: &MapSet, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> Plane<i32> {
     let asked = asked(maps, votes);
     let [along, across] = vote_weights();
     // Weights of the steps from each half-size pixel to the one above.
@@ -75,11 +79,11 @@ fn elect(maps: &MapSet, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> 
             *weight = across[difference(here, above)];
         }
     });
-    let mut elected = Plane::filled(votes.width, votes.height, None);
+    let mut elected = Plane::filled(votes.width, votes.height, NO_VOTE);
     // Labels are padded to whole blocks; padding gets no votes.
     let stride = votes.labels.next_multiple_of(BLOCK);
     let row_length = votes.width * stride;
-    let mut sums = vec![0; votes.summed() * row_length];
+    let mut sums = Pages::new(votes.summed() * row_length).expect("memory for the votes of a band");
     for first in (0..votes.height).step_by(votes.band) {
         let band = first..(first + votes.band).min(votes.height);
         let seen = first.saturating_sub(VOTE_REACH)..(band.end + VOTE_REACH).min(votes.height);
@@ -106,8 +110,9 @@ fn elect(maps: &MapSet, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> 
                         *below = Step { from: at(y + away), weight: steps_down[(x, y + away)] };
                     }
                 }
-                sum_column(totals, &sums, at(y), &steps);
-                *vote = winner(&totals[..votes.labels]).map(|vote| vote + FRACTION * plan.range.min);
+                let extremes = sum_column(votes.labels, totals, &sums, at(y), &steps);
+                *vote = winner(&totals[..votes.labels], extremes)
+                    .map_or(NO_VOTE, |vote| vote + FRACTION * plan.range.min);
             }
         });
     }
@@ -138,7 +143,16 @@ struct Scratch {
 }
 
 /// Votes of the half-size pixels of row `y` themselves, \[x\]\[label\].
-fn own_votes(maps: &MapSet, plan: &Plan, y: usize, out: &mut [u32], scratch: &mut Scratch) {
+#[pulp::with_simd(own_votes = crate::vectors::widest())]
+#[inline(always)]
+fn own_votes_on<'a, S: pulp::Simd>(
+    _: S,
+    maps: &'a MapSet,
+    plan: &'a Plan,
+    y: usize,
+    out: &'a mut [u32],
+    scratch: &'a mut Scratch,
+) {
     let (width, height) = maps.disparity.size();
     let (min, labels) = (plan.range.min, plan.levels[0].labels);
     let stride = labels.div_ceil(2).next_multiple_of(BLOCK);
@@ -176,9 +190,8 @@ fn own_votes(maps: &MapSet, plan: &Plan, y: usize, out: &mut [u32], scratch: &mu
 }
 
 /// Votes for a disparity, in 1/256 px from the smallest label.
-#[pulp::with_simd(vote_for = crate::vectors::widest())]
 #[inline(always)]
-fn vote_for_on<S: pulp::Simd>(_: S, votes: &mut [u32], disparity: i32) {
+fn vote_for(votes: &mut [u32], disparity: i32) {
     for (vote, label) in votes.iter_mut().zip(0..) {
         let away = (disparity - 2 * FRACTION * label).abs().min(VOTE_MOST) >> VOTE_BITS;
         *vote += (away as u32) << VOTE_FRACTION_BITS;
@@ -186,9 +199,8 @@ fn vote_for_on<S: pulp::Simd>(_: S, votes: &mut [u32], disparity: i32) {
 }
 
 /// Votes against labels at least as near as in `hiding`. `near` is the nearness of the first label and the increment.
-#[pulp::with_simd(vote_against_hiding = crate::vectors::widest())]
 #[inline(always)]
-fn vote_against_hiding_on<'a, S: pulp::Simd>(_: S, votes: &'a mut [u32], hiding: &'a [i32], near: [i32; 2]) {
+fn vote_against_hiding(votes: &mut [u32], hiding: &[i32], near: [i32; 2]) {
     for ((vote, &least), label) in votes.iter_mut().zip(hiding).zip(0..) {
         let hides = near[0] + near[1] * label >= least;
         *vote += if hides { VOTE_HIDING << VOTE_FRACTION_BITS } else { 0 };
@@ -223,16 +235,18 @@ fn sum_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut [u32], stride: usize, scratc
     }
 }
 
-/// The sums at `at` plus those carried along the column by `steps` from above and below, farthest first.
+/// The sums at `at` plus those carried along the column by `steps` from above and below, farthest first. Returns the smallest and the
+/// largest one of the first `labels`.
 #[pulp::with_simd(sum_column = crate::vectors::widest())]
 #[inline(always)]
 fn sum_column_on<'a, S: pulp::Simd>(
     _: S,
+    labels: usize,
     totals: &'a mut [u32],
     sums: &'a [u32],
     at: usize,
     steps: &'a [[Step; 2]; VOTE_REACH],
-) {
+) -> (u32, u32) {
     for (i, totals) in totals.as_chunks_mut::<BLOCK>().0.iter_mut().enumerate() {
         let mut carried = [[0; BLOCK]; 2];
         for steps in steps {
@@ -245,11 +259,11 @@ fn sum_column_on<'a, S: pulp::Simd>(
         let [above, below] = carried;
         *totals = each_lane(|lane| own[lane] + above[lane] + below[lane]);
     }
+    totals[..labels].iter().fold((u32::MAX, 0), |(least, most), &sum| (least.min(sum), most.max(sum)))
 }
 
-/// The winner of `sums`, in 1/256 px from the smallest label; `None` if all are the same.
-fn winner(sums: &[u32]) -> Option<i32> {
-    let (least, most) = extremes(sums);
+/// The winner of `sums` with these extremes, in 1/256 px from the smallest label; `None` if all are the same.
+fn winner(sums: &[u32], (least, most): (u32, u32)) -> Option<i32> {
     if most == least {
         return None;
     }
@@ -268,40 +282,43 @@ fn winner(sums: &[u32]) -> Option<i32> {
     Some(2 * FRACTION * label as i32 + offset)
 }
 
-/// The smallest and the largest of these sums.
-#[pulp::with_simd(extremes = crate::vectors::widest())]
-#[inline(always)]
-fn extremes_on<S: pulp::Simd>(_: S, sums: &[u32]) -> (u32, u32) {
-    sums.iter().fold((u32::MAX, 0), |(least, most), &sum| (least.min(sum), most.max(sum)))
-}
-
 /// Filled pixels take the vote of the most similar half-size pixel around them, outvoted ones that of their own.
-fn take(maps: &mut MapSet, left: &Image, colours: &Plane<[u8; 3]>, elected: &Plane<Option<i32>>) {
+fn take(maps: &mut MapSet, left: &Image, colours: &Plane<[u8; 3]>, elected: &Plane<i32>) {
     let width = maps.disparity.width();
     let rows =
         maps.disparity.data_mut().par_chunks_mut(width).zip(maps.validity.data_mut().par_chunks_mut(width));
     let rows = rows.zip(maps.confidence.data_mut().par_chunks_mut(width)).enumerate();
     rows.for_each(|(y, ((disparity, flags), confidence))| {
+        let pixels = left.pixels.row(y);
         for (x, ((disparity, flags), confidence)) in
             disparity.iter_mut().zip(flags).zip(confidence).enumerate()
         {
             if is_filled(*flags) {
-                let own = channels(left.pixels[(x, y)]);
-                let places = around(y, elected.height())
-                    .flat_map(|row| around(x, elected.width()).map(move |column| (column, row)));
-                let candidates = places.filter_map(|at| {
-                    let away = at.0.abs_diff(x / 2) + at.1.abs_diff(y / 2);
-                    let unlike = difference(own, colours[at]) + VOTE_AWAY as usize * away;
-                    elected[at].map(|vote| (unlike, vote))
-                });
-                if let Some((_, vote)) = candidates.min_by_key(|candidate| candidate.0) {
-                    *disparity = vote;
+                let own = channels(pixels[x]);
+                let (mut least, mut taken) = (usize::MAX, NO_VOTE);
+                for row in around(y, elected.height()) {
+                    let columns = around(x, elected.width());
+                    let colours = &colours.row(row)[columns.clone()];
+                    let votes = &elected.row(row)[columns.clone()];
+                    for ((&colour, &vote), column) in colours.iter().zip(votes).zip(columns) {
+                        let away = column.abs_diff(x / 2) + row.abs_diff(y / 2);
+                        let unlike = difference(own, colour) + VOTE_AWAY as usize * away;
+                        if vote != NO_VOTE && unlike < least {
+                            (least, taken) = (unlike, vote);
+                        }
+                    }
                 }
-            } else if let Some(vote) = elected[(x / 2, y / 2)]
-                && may_be_outvoted(*flags, *confidence)
-                && (vote - *disparity).abs() > VOTE_OUTVOTES
-            {
-                (*disparity, *flags, *confidence) = (vote, flag::OUTVOTED | flag::FILLED, 0);
+                if taken != NO_VOTE {
+                    *disparity = taken;
+                }
+            } else {
+                let vote = elected[(x / 2, y / 2)];
+                if vote != NO_VOTE
+                    && may_be_outvoted(*flags, *confidence)
+                    && (vote - *disparity).abs() > VOTE_OUTVOTES
+                {
+                    (*disparity, *flags, *confidence) = (vote, flag::OUTVOTED | flag::FILLED, 0);
+                }
             }
         }
     });
@@ -332,7 +349,7 @@ mod tests {
         });
         let of = |band| elect(&maps, &plan, &colours, Votes { band, ..Votes::of(&plan) });
         let whole = of(height);
-        assert!(whole.data().iter().flatten().count() > 400);
+        assert!(whole.data().iter().filter(|&&vote| vote != NO_VOTE).count() > 400);
         for band in [1, 2, 7, 30] {
             assert!(of(band) == whole, "{band}");
         }
