@@ -81,7 +81,8 @@ fn pool(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         low = min(low, child.x & 0xfffffu);
         high = max(high, child.y & 0xfffffu);
         slope += child.x >> 20u;
-        cap += child.y >> 20u;
+        let own = child.y >> 20u;
+        cap += select(own, max(own, GUESS_FADE) - GUESS_FADE, own <= GUESS_CAP);
         count += 1u;
     }
     var pooled = vec2(0u);

@@ -1,6 +1,6 @@
 // Adds the prior to the evidence, and sets the beliefs to it. One invocation per pixel.
 
-#import band volume windows messages
+#import band volume windows messages prior
 
 struct Params {
     level: Level,
@@ -13,17 +13,11 @@ struct Params {
 @group(0) @binding(1) var<storage, read_write> evidence: array<u32>;
 @group(0) @binding(2) var<storage, read_write> belief: array<Quad>;
 @group(0) @binding(3) var<storage, read> windows: array<u32>;
-// First label without a cost | slope << 20, last label without a cost | cap << 20.
 @group(0) @binding(4) var<storage, read> prior: array<vec2<u32>>;
 
 // Evidence and prior of a quad.
 fn sum_of(known: vec2<u32>, word: u32, quad: u32) -> vec4<u32> {
-    let at = (labels_of(quad) + vec4(1u)) << vec4(PRIOR_LABEL_BITS);
-    let low = vec4(known.x & 0xfffffu);
-    let high = vec4(known.y & 0xfffffu);
-    let away = min(max(max(low, at) - at, max(at, high) - high), vec4(PRIOR_REACH));
-    let cost = (vec4(known.x >> 20u) * away) >> vec4(PRIOR_LABEL_BITS + PRIOR_SLOPE_BITS);
-    return unpack_narrow(word) + min(cost, vec4(known.y >> 20u));
+    return unpack_narrow(word) + prior_cost(known, quad);
 }
 
 @compute @workgroup_size(GROUP)
@@ -33,7 +27,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
     let known = prior[id.y * params.level.pixel_pitch + id.x];
-    if (known.y >> 20u) == 0u {
+    if prior_cap(known) == 0u {
         return;
     }
     let row = id.y * params.level.pitch;

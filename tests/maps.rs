@@ -12,7 +12,7 @@ use common::twin::{self, Finest};
 use mrfgs::Matcher;
 use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::low_level::backend::cpu::Cpu;
-use mrfgs::low_level::backend::{Backend, Map, NO_LABEL, Stage};
+use mrfgs::low_level::backend::{Backend, Map, NO_LABEL, Stage, Volume};
 use mrfgs::low_level::engine::Solution;
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
@@ -143,14 +143,18 @@ fn the_stages_run_in_order() {
             let mut iterations = estimated(backend, &pair, &plan);
             let mut finest = Finest::zero(size);
             for look in 0..plan.looks() {
-                if look > 0 {
+                let guess = (look > 0).then(|| guessed(&finest, &plan, &pair));
+                if let Some(guess) = &guess {
                     looked_again += 1;
-                    let guess = guessed(&finest, &plan, &pair);
-                    iterations += estimated_again(backend, &pair, &plan, guess);
+                    iterations += estimated_again(backend, &pair, &plan, guess.clone());
                 }
                 finest.label = block_on(backend.map(Map::Label)).unwrap();
                 finest.best = block_on(backend.map(Map::Best)).unwrap();
                 finest.runner_up = block_on(backend.map(Map::RunnerUp)).unwrap();
+                if let Some(guess) = &guess {
+                    let belief = backend.probe().read(Volume::Belief(0)).unwrap();
+                    twin::lead::lead(&plan, &belief, &guess.levels[0], &mut finest);
+                }
                 finest.right_label = match plan.method.refinement.left_right_check {
                     LeftRightCheck::SecondMatch => second_match(&pair, &plan),
                     _ => block_on(backend.map(Map::RightLabel)).unwrap(),

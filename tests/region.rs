@@ -45,7 +45,7 @@ fn a_region_is_nearly_a_part_of_the_whole() {
             let whole = cpu().job(&pair, RANGE).method(&method).run().unwrap().maps;
             let found = part_of(&pair, &part, &method);
             let off = moved(&found.final_map(), &whole.crop(&part).final_map());
-            assert!(off <= 1.5, "{name}: {off} %");
+            assert!(off <= 2.5, "{name}: {off} %");
             // Control: the pair cropped to the region gives a different map.
             let alone = cpu().job(&pair.crop(&part), RANGE).method(&method).run().unwrap().maps;
             let off_alone = moved(&alone.final_map(), &whole.crop(&part).final_map());

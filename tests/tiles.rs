@@ -254,7 +254,7 @@ fn tiling_changes_few_pixels() {
             // Plain walls are estimated from their borders, however distant.
             let is_plain = ["wall", "poster", "corridor"].iter().any(|name| folder.ends_with(name));
             let most = match quarters {
-                _ if is_plain => 0.5,
+                _ if is_plain => 1.5,
                 3 => 0.03,
                 _ => 0.07,
             };

@@ -66,7 +66,8 @@ pub(crate) fn after_looks(steps: &[Step]) -> usize {
 fn message_passing(plan: &Plan, look: u32) -> Vec<Step> {
     let right = plan.reads_right_view().then_some(Stage::RightView);
     let between_labels = if plan.full.is_some() { Stage::Refine } else { Stage::SubPixel };
-    let read_out = iter::once(Stage::WinnerTakesAll).chain(right).chain([between_labels]);
+    let lead = (look > 0).then_some(Stage::Lead);
+    let read_out = iter::once(Stage::WinnerTakesAll).chain(lead).chain(right).chain([between_labels]);
     let mut steps = flood(plan, look, |plan, z| join(plan, look, z));
     steps.extend(read_out.map(Step::of));
     steps

@@ -17,20 +17,30 @@
 //! lo    = floor((smallest lo - F o - F) / 2)          cut to -F ..= F labels, like hi
 //! hi    = ceil((largest hi - F o + F) / 2)
 //! slope = min(2 (sum of slopes) / n, 4095)            rounded down, n children
-//! cap   = (sum of caps) / n                           rounded down
+//! cap   = (sum of caps) / n                           rounded down; a guess counts GUESS_FADE less than its cap, at least 0
 //! ```
+//!
+//! So a guess counts less at coarser levels, and nothing from the third one on: there, it would carry too far from plain walls whose
+//! few matches are wrong.
 //!
 //! Smoothing ([`median`](super::median), [`plane`](super::plane)) is left out between two looks: the guesses become no better by it.
 //!
-//! (A match cannot decide where a surface is hidden or plain; what was filled in from its surroundings often can. A prior of one nat
-//! loses against any clear match, so that the next look corrects wrong guesses, and its messages carry right ones farther.)
+//! (A match cannot decide where a surface is hidden or plain; what was filled in from its surroundings often can. A prior of little more
+//! than a nat loses against any clear match, so that the next look corrects wrong guesses, and its messages carry right ones farther.)
 
 use super::{Data, Descriptor, Map, maps};
 
-/// The largest cost of a guess: one nat.
-pub(crate) const GUESS_CAP: u8 = 4;
+/// The largest cost of a guess, in units: 1.25 nats.
+pub(crate) const GUESS_CAP: u8 = 5;
+/// What a guess loses of its cap from a level to the next coarser one, in units: half a nat.
+pub(crate) const GUESS_FADE: u8 = 2;
 /// The cost of a guess per label, in 1/16 unit: one nat.
 pub(crate) const GUESS_SLOPE: u32 = 64;
+
+/// What a prior with this cap counts in the cap of the next coarser level.
+pub(crate) const fn faded(cap: u8) -> u8 {
+    if cap > GUESS_CAP { cap } else { cap.saturating_sub(GUESS_FADE) }
+}
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |z| match z.checked_sub(1) {

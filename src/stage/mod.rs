@@ -32,7 +32,7 @@ macro_rules! for_every_stage {
             }
             level_rows { Evidence evidence; Prior prior; Dependency dependency; Resolution resolution; Belief belief; }
             finest { Cost cost; Change change; Refine refine; SwapViews swap_views; MirrorLabels mirror_labels; }
-            finest_rows { WinnerTakesAll winner_takes_all; RightView right_view; SubPixel sub_pixel; }
+            finest_rows { WinnerTakesAll winner_takes_all; Lead lead; RightView right_view; SubPixel sub_pixel; }
             maps {
                 LeftRightCheck left_right_check; SpeckleFilter speckle_filter; Confidence confidence; Anchor anchor;
                 Fill fill; VoteFill vote_fill; FillPlane fill_plane; Median median; Plane plane; Support support;
@@ -120,7 +120,7 @@ macro_rules! define {
                     Self::Pyramid(z) | Self::Resolution(z) => *z > 0,
                     Self::LabelRange(_) => plan.limits_labels(),
                     Self::Prior(_) => plan.has_priors(),
-                    Self::Guess(_) => plan.looks() > 1,
+                    Self::Guess(_) | Self::Lead => plan.looks() > 1,
                     Self::Anchor => plan.prior,
                     Self::Refine | Self::Enlarge => plan.full.is_some(),
                     _ => true,

@@ -9,11 +9,12 @@ use std::fmt::Write;
 pub(super) const WORKGROUP: u32 = 64;
 
 /// The shared parts, by their names in `#import` lines.
-const SHARED: [(&str, &str); 8] = [
+const SHARED: &[(&str, &str)] = &[
     ("band", include_str!("../../../shaders/shared/band.wgsl")),
     ("image", include_str!("../../../shaders/shared/image.wgsl")),
     ("maps", include_str!("../../../shaders/shared/maps.wgsl")),
     ("messages", include_str!("../../../shaders/shared/messages.wgsl")),
+    ("prior", include_str!("../../../shaders/shared/prior.wgsl")),
     ("sections", include_str!("../../../shaders/shared/sections.wgsl")),
     ("volume", include_str!("../../../shaders/shared/volume.wgsl")),
     ("windows", include_str!("../../../shaders/shared/windows.wgsl")),

@@ -6,7 +6,7 @@ use crate::maps::{FRACTION, is_filled};
 use crate::plan::{LevelPlan, PRIOR_SLOPE_BITS, PRIOR_SLOPE_MOST, Plan, UNITS_PER_NAT};
 use crate::prior::PriorKind;
 use crate::stage::NO_ANCHOR;
-use crate::stage::guess::{GUESS_CAP, GUESS_SLOPE};
+use crate::stage::guess::{GUESS_CAP, GUESS_SLOPE, faded};
 use crate::stage::prior::{LabelPrior, LevelPriors};
 use crate::threads::prelude::*;
 
@@ -100,7 +100,7 @@ pub(crate) fn guessed(
 }
 
 /// The prior of a level from that of the next finer one: the smallest interval that holds those of all known children, with twice
-/// their mean slope, because a label is twice as wide, and their mean cap. Coarse label k stands for fine labels
+/// their mean slope, because a label is twice as wide, and their mean cap, which [fades](faded) if they are guesses. Coarse label k stands for fine labels
 /// 2 k + `offset` - 1 ..= 2 k + `offset` + 1.
 pub(crate) fn coarser(fine: &Plane<LabelPrior>, level: &LevelPlan, offset: i32) -> Plane<LabelPrior> {
     let (width, height) = fine.size();
@@ -112,7 +112,8 @@ pub(crate) fn coarser(fine: &Plane<LabelPrior>, level: &LevelPlan, offset: i32) 
                 for child in &fine.row(v)[2 * x..(2 * x + 2).min(width)] {
                     if child.cap > 0 {
                         (lo, hi) = (lo.min(child.lo), hi.max(child.hi));
-                        (slope, cap, count) = (slope + child.slope, cap + u32::from(child.cap), count + 1);
+                        (slope, cap, count) =
+                            (slope + child.slope, cap + u32::from(faded(child.cap)), count + 1);
                     }
                 }
             }

@@ -17,7 +17,7 @@ pub fn take(
 ) -> Plane<LabelPrior> {
     let (width, height) = plan.size();
     Plane::from_fn(width, height, |x, y| {
-        if let Some(known) = known.map(|known| known[(x, y)]).filter(|known| known.cap > 4) {
+        if let Some(known) = known.map(|known| known[(x, y)]).filter(|known| known.cap > 5) {
             return LabelPrior {
                 lo: cut(plan, 0, known.lo),
                 hi: cut(plan, 0, known.hi),
@@ -31,7 +31,7 @@ pub fn take(
         }
         let label = f64::from(disparity[(x, y)]) / 256.0 - f64::from(plan.range.min);
         let at = cut(plan, 0, (32.0 * label).floor() as i32);
-        LabelPrior { lo: at, hi: at, slope: 64, cap: 4 }
+        LabelPrior { lo: at, hi: at, slope: 64, cap: 5 }
     })
 }
 
@@ -46,12 +46,14 @@ pub fn pool(plan: &Plan, level: usize, finer: &Plane<LabelPrior>) -> Plane<Label
         let Some(lo) = children.iter().map(|child| child.lo).min() else { return LabelPrior::default() };
         let hi = children.iter().map(|child| child.hi).max().unwrap();
         let count = children.len() as u32;
+        // Caps up to 5 are guesses, which fade.
+        let counted = |cap: u8| u32::from(if cap <= 5 { cap.max(2) - 2 } else { cap });
         let half = |end: i32, f: fn(f64) -> f64| f(f64::from(end - 32 * offset) / 2.0) as i32;
         LabelPrior {
             lo: cut(plan, level, half(lo - 32, f64::floor)),
             hi: cut(plan, level, half(hi + 32, f64::ceil)),
             slope: (2 * children.iter().map(|child| child.slope).sum::<u32>() / count).min(4095),
-            cap: (children.iter().map(|child| u32::from(child.cap)).sum::<u32>() / count) as u8,
+            cap: (children.iter().map(|child| counted(child.cap)).sum::<u32>() / count) as u8,
         }
     })
 }

@@ -7,7 +7,7 @@ use crate::backend::gpu::kernel::{Variant, shader};
 use crate::backend::gpu::uniform::LevelParams;
 use crate::error::Result;
 use crate::plan::{PRIOR_LABEL_BITS, PRIOR_SLOPE_MOST};
-use crate::stage::guess::{GUESS_CAP, GUESS_SLOPE};
+use crate::stage::guess::{GUESS_CAP, GUESS_FADE, GUESS_SLOPE};
 
 shader! {
     "guess"(plan, level) { fine: LevelParams, label_offset: i32 }
@@ -21,6 +21,7 @@ fn variant(loops: usize) -> Variant {
         .with("PRIOR_LABEL_BITS", PRIOR_LABEL_BITS)
         .with("PRIOR_SLOPE_MOST", PRIOR_SLOPE_MOST)
         .with("GUESS_CAP", u32::from(GUESS_CAP))
+        .with("GUESS_FADE", u32::from(GUESS_FADE))
         .with("GUESS_SLOPE", GUESS_SLOPE)
 }
 
