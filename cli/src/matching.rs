@@ -126,15 +126,23 @@ const TRUSTED: f64 = 0.9;
 
 /// Prints what became of a prior, with a warning where the images contradict it.
 fn say_prior(name: &str, used: PriorUse) {
-    let PriorUse { kind, given, dropped, trust } = used;
+    let PriorUse { kind, given, dropped, .. } = used;
     let text = match kind {
         PriorKind::Points => format!("{given} point{} of the prior, {dropped} dropped", plural(given)),
         PriorKind::Surface => format!("a prior for {given} pixel{}", plural(given)),
     };
-    let warning = match trust {
-        0.0 => "; warning: the images contradict it, so it was not used: is it of this scene, in pixels of disparity?".into(),
-        _ if trust >= TRUSTED => String::new(),
-        _ => format!("; warning: the images contradict it in part, so it counts {:.0} %", 100.0 * trust),
-    };
+    let warning = prior_warning(used).map_or(String::new(), |warning| format!("; warning: {warning}"));
     console::say(&format!("{name}{text}{warning}"));
+}
+
+/// The warning of a prior that the images contradict.
+pub(crate) fn prior_warning(used: PriorUse) -> Option<String> {
+    match used.trust {
+        trust if trust >= TRUSTED => None,
+        0.0 => Some(
+            "the images contradict it, so it was not used: is it of this scene, in pixels of disparity?"
+                .into(),
+        ),
+        trust => Some(format!("the images contradict it in part, so it counts {:.0} %", 100.0 * trust)),
+    }
 }

@@ -1,5 +1,6 @@
 //! The flags of a prior: known disparities of the left view.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,6 +10,7 @@ use mrfgs::image::read;
 use mrfgs::low_level::text;
 use mrfgs::prior::{PriorKind, PriorPoint};
 use mrfgs::{Error, Prior};
+use serde::Serialize;
 
 use crate::args::Sign;
 use crate::failure::{Failure, Result};
@@ -17,8 +19,9 @@ use crate::failure::{Failure, Result};
 const MOST_BYTES: u64 = 1 << 30;
 
 /// How a prior is used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Kind {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
     /// Exact but sparse: cleaned, spread, and they decide where no match can be trusted
     Points,
     /// Dense but coarse: it only shifts the balance between disparities
@@ -51,72 +54,103 @@ impl PriorArgs {
 
     /// Reads the prior for a left view of (width, height) pixels, with disparities by `sign`.
     pub(crate) fn read(&self, size: (usize, usize), sign: Sign) -> Result<Option<Arc<Prior>>> {
-        let Some(path) = self.file() else { return Ok(None) };
-        if let Some(sigma) = self.prior_sigma.filter(|sigma| !(*sigma > 0.0 && sigma.is_finite())) {
-            return Err(Failure::usage("--prior-sigma", format!("{sigma} is not above 0")));
+        let Self { prior_sigma, prior_kind, .. } = *self;
+        let names = ["--prior", "--prior-sigma", "--prior-kind"];
+        let file = self.file().map(|path| PriorFile { path, sigma: prior_sigma, kind: prior_kind, names });
+        file.map(|file| file.read(size, sign)).transpose()
+    }
+}
+
+/// A file of known disparities, and how to use it.
+pub(crate) struct PriorFile<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) sigma: Option<f64>,
+    pub(crate) kind: Option<Kind>,
+    /// The flags or columns that gave file, sigma and kind.
+    pub(crate) names: [&'static str; 3],
+}
+
+impl PriorFile<'_> {
+    /// Reads the prior for a left view of (width, height) pixels, with disparities by `sign`.
+    pub(crate) fn read(&self, size: (usize, usize), sign: Sign) -> Result<Arc<Prior>> {
+        if let Some(sigma) = self.sigma.filter(|sigma| !(*sigma > 0.0 && sigma.is_finite())) {
+            return Err(Failure::usage(self.names[1], format!("{sigma} is not above 0")));
         }
-        let prior = if is_list(path) { self.listed(path, size, sign) } else { self.map(path, size, sign) };
-        prior.map(|prior| Some(Arc::new(prior)))
+        let prior = if is_list(self.path) { self.listed(size, sign) } else { self.map(size, sign) };
+        prior.map(Arc::new)
     }
 
-    fn sigma(&self, kind: PriorKind) -> f64 {
-        self.prior_sigma.unwrap_or(kind.usual_sigma())
+    /// Sigma, or the usual one of this kind.
+    fn sigma_of(&self, kind: PriorKind) -> f64 {
+        self.sigma.unwrap_or(kind.usual_sigma())
     }
 
     fn kind(&self) -> Option<PriorKind> {
-        self.prior_kind.map(|kind| match kind {
+        self.kind.map(|kind| match kind {
             Kind::Points => PriorKind::Points,
             Kind::Surface => PriorKind::Surface,
         })
     }
 
-    fn map(&self, path: &Path, size: (usize, usize), sign: Sign) -> Result<Prior> {
-        let map = sign.map(read::read_disparity(path)?);
-        if map.size() != size {
-            let ((w, h), (width, height)) = (map.size(), size);
-            let reason = format!("{} has {w} x {h} pixels, LEFT {width} x {height}", path.display());
-            return Err(Failure::usage("--prior", format!("{reason}; give a map of LEFT")));
-        }
-        let kind = self.kind().unwrap_or_else(|| PriorKind::of_map(&map));
-        let prior = Prior::map(kind, &map, self.sigma(kind));
-        prior.map_err(|e| named(path, e))
+    /// A failure that names the file.
+    fn refused(&self, reason: impl Display) -> Failure {
+        Failure::usage(self.names[0], format!("{}{reason}", self.path.display()))
     }
 
-    fn listed(&self, path: &Path, size: (usize, usize), sign: Sign) -> Result<Prior> {
+    /// The failure of the library to take what the file holds.
+    fn of_library(&self, e: Error) -> Failure {
+        match e {
+            Error::Mismatch(reason) => self.refused(format_args!(": {reason}")),
+            e => e.into(),
+        }
+    }
+
+    fn map(&self, size: (usize, usize), sign: Sign) -> Result<Prior> {
+        let map = sign.map(read::read_disparity(self.path)?);
+        if map.size() != size {
+            let ((w, h), (width, height)) = (map.size(), size);
+            let reason = format!(" has {w} x {h} pixels, LEFT {width} x {height}; give a map of LEFT");
+            return Err(self.refused(reason));
+        }
+        let kind = self.kind().unwrap_or_else(|| PriorKind::of_map(&map));
+        Prior::map(kind, &map, self.sigma_of(kind)).map_err(|e| self.of_library(e))
+    }
+
+    fn listed(&self, size: (usize, usize), sign: Sign) -> Result<Prior> {
+        let path = self.path;
         if self.kind() == Some(PriorKind::Surface) {
             let reason = format!("{} holds points; give a map for a surface", path.display());
-            return Err(Failure::usage("--prior-kind", reason));
+            return Err(Failure::usage(self.names[2], reason));
         }
         let text = text::read(path, MOST_BYTES, "a list of points")?;
         let mut reader =
             ReaderBuilder::new().has_headers(false).flexible(true).trim(Trim::All).from_reader(&text[..]);
         let mut points = Vec::new();
         for (i, row) in reader.records().enumerate() {
-            let row = row.map_err(|e| Failure::usage("--prior", format!("{}: {e}", path.display())))?;
+            let row = row.map_err(|e| self.refused(format_args!(": {e}")))?;
             let values: Option<Vec<f64>> = row.iter().map(|value| value.parse().ok()).collect();
             let point = match values.as_deref() {
-                Some(&[x, y, d]) => PriorPoint { x, y, disparity: d, sigma: self.sigma(PriorKind::Points) },
+                Some(&[x, y, d]) => {
+                    PriorPoint { x, y, disparity: d, sigma: self.sigma_of(PriorKind::Points) }
+                }
                 Some(&[x, y, d, sigma]) => {
-                    PriorPoint { x, y, disparity: d, sigma: self.prior_sigma.unwrap_or(sigma) }
+                    PriorPoint { x, y, disparity: d, sigma: self.sigma.unwrap_or(sigma) }
                 }
                 // A line with names of columns.
                 None if i == 0 => continue,
                 _ => {
                     let line = row.position().map_or(i as u64 + 1, csv::Position::line);
                     let reason = "not x,y,disparity or x,y,disparity,sigma in pixels";
-                    return Err(Failure::usage(
-                        "--prior",
-                        format!("{}, line {line}: {reason}", path.display()),
-                    ));
+                    return Err(self.refused(format_args!(", line {line}: {reason}")));
                 }
             };
             let disparity = if sign == Sign::default() { point.disparity } else { -point.disparity };
             points.push(PriorPoint { disparity, ..point });
         }
         if points.is_empty() {
-            return Err(Failure::usage("--prior", format!("{} holds no point", path.display())));
+            return Err(self.refused(" holds no point"));
         }
-        Prior::points(size, points).map_err(|e| named(path, e))
+        Prior::points(size, points).map_err(|e| self.of_library(e))
     }
 }
 
@@ -124,14 +158,6 @@ impl PriorArgs {
 fn is_list(path: &Path) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     ["csv", "txt"].iter().any(|list| extension.eq_ignore_ascii_case(list))
-}
-
-/// The failure of a prior, with its file.
-fn named(path: &Path, e: Error) -> Failure {
-    match e {
-        Error::Mismatch(reason) => Failure::usage("--prior", format!("{}: {reason}", path.display())),
-        e => e.into(),
-    }
 }
 
 #[cfg(test)]

@@ -168,6 +168,7 @@ impl PairArgs {
             right: path(self.right()),
             mask: self.mask.as_deref().map(path),
             calibration: input.calibration_files(),
+            prior: None,
             output: output.map(path),
         }
     }

@@ -1,24 +1,37 @@
 //! Lists of pairs: CSV files in UTF-8 whose header names the columns.
 //!
-//! Columns are name, left and right, and optionally `max_disparity`, `min_disparity`, mask and calibration. An empty field counts as
-//! missing. Empty lines and lines starting with # are skipped.
+//! Columns are name, left and right, and optionally `max_disparity`, `min_disparity`, mask, calibration, prior, `prior_sigma` and
+//! `prior_kind`. An empty field counts as missing. Empty lines and lines starting with # are skipped.
 
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::Path;
 
+use clap::ValueEnum;
 use csv::{ReaderBuilder, StringRecord, Trim};
 use mrfgs::low_level::text::{self, quoted};
 use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
+use serde::Serialize;
 
+pub use crate::args::PriorKind;
 pub use crate::args::search::{Largest, pixels};
 use crate::outputs::also;
 use crate::remedy;
 
 /// The columns of a list; the first three are required.
-pub(crate) const COLUMNS: [&str; 7] =
-    ["name", "left", "right", "max_disparity", "min_disparity", "mask", "calibration"];
+pub(crate) const COLUMNS: [&str; 10] = [
+    "name",
+    "left",
+    "right",
+    "max_disparity",
+    "min_disparity",
+    "mask",
+    "calibration",
+    "prior",
+    "prior_sigma",
+    "prior_kind",
+];
 const REQUIRED: usize = 3;
 
 /// The longest name of a pair in bytes, short enough to leave room for the endings of its files.
@@ -27,7 +40,7 @@ const MAX_NAME: usize = 200;
 const MAX_BYTES: u64 = 1 << 28;
 
 /// One pair of a list.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// The name of its outputs; see [`Names`].
     pub name: String,
@@ -43,6 +56,22 @@ pub struct Row {
     pub max_disparity: Option<Largest>,
     /// Smallest disparity to search, in pixels, if given; at most the largest.
     pub min_disparity: Option<i32>,
+    /// What is known of the scene, if anything is.
+    pub prior: Option<PriorRow>,
+}
+
+/// What is known of the scene of a pair.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PriorRow {
+    /// Path of the file, as written in the list.
+    #[serde(skip)]
+    pub file: String,
+    /// Standard deviation in pixels, if given; above 0.
+    #[serde(rename = "prior_sigma")]
+    pub sigma: Option<f64>,
+    /// How to use it, if given.
+    #[serde(rename = "prior_kind")]
+    pub kind: Option<PriorKind>,
 }
 
 /// Reads a list, which may have no rows.
@@ -117,6 +146,23 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
     let within = |column: &str, reason: String| format!("{column}: {reason}");
     let max = field("max_disparity").map(str::parse).transpose();
     let min = field("min_disparity").map(pixels).transpose();
+    let prior = match field("prior") {
+        Some(file) => {
+            let sigma = field("prior_sigma").map(sigma).transpose();
+            let kind = field("prior_kind").map(|kind| PriorKind::from_str(kind, false)).transpose();
+            Some(PriorRow {
+                file: file.to_owned(),
+                sigma: sigma.map_err(|reason| within("prior_sigma", reason))?,
+                kind: kind.map_err(|_| within("prior_kind", "must be points or surface".to_owned()))?,
+            })
+        }
+        None => match ["prior_sigma", "prior_kind"].into_iter().find(|column| field(column).is_some()) {
+            Some(column) => {
+                return Err(within(column, "there is no prior; fill that column, too".to_owned()));
+            }
+            None => None,
+        },
+    };
     let files = field("calibration").into_iter().flat_map(|files| files.split(';'));
     let row = Row {
         name: required("name")?,
@@ -129,12 +175,19 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
         calibration: files.map(|file| file.trim().to_owned()).filter(|file| !file.is_empty()).collect(),
         max_disparity: max.map_err(|reason| within("max_disparity", reason))?,
         min_disparity: min.map_err(|reason| within("min_disparity", reason))?,
+        prior,
     };
     if let Some(Largest::Pixels(max)) = row.max_disparity {
         let range = DisparityRange::new(row.min_disparity.unwrap_or(0), max);
         range.map_err(|error| remedy::error(&error, &remedy::COLUMNS))?;
     }
     Ok(row)
+}
+
+/// A standard deviation in pixels.
+fn sigma(field: &str) -> std::result::Result<f64, String> {
+    let sigma = field.parse().ok().filter(|sigma: &f64| *sigma > 0.0 && sigma.is_finite());
+    sigma.ok_or_else(|| format!("{} is not a number above 0", quoted(field)))
 }
 
 /// The names of pairs so far, each valid as a file name on every file system: without / \ : * ? " < > | and control characters, no leading

@@ -1,5 +1,6 @@
 //! `mrfgs batch`: the maps equal those of single matches, and every pair is matched exactly once however runs are interrupted.
 
+use std::collections::HashSet;
 use std::fmt::Write;
 use std::time::SystemTime;
 
@@ -103,6 +104,77 @@ fn a_batch_is_its_single_matches() {
         let pair = "images/0-left.png images/0-right.png";
         run(&folder, &format!("match {pair} {name} --max-disparity 31 --device cpu")).succeeded();
         assert!(at(&name) == at(&format!("{format}/pair-0.{format}")));
+    }
+}
+
+#[test]
+fn a_list_may_tell_what_is_known_of_each_scene() {
+    let folder = Folder::new();
+    for file in ["im0.png", "im1.png", "lidar.csv", "disp0GT.pfm"] {
+        fs::copy(scene("poster").join(file), folder.join(file)).unwrap();
+    }
+    // A surface that is not there, before a scene with texture.
+    for (from, to) in [("im0.png", "l.png"), ("im1.png", "r.png")] {
+        fs::copy(scene("slanted").join(from), folder.join(to)).unwrap();
+    }
+    let places = (0..180).step_by(9).flat_map(|y| (0..240).step_by(9).map(move |x| (x, y)));
+    let lines: Vec<_> = places.map(|(x, y)| format!("{x},{y},1\n")).collect();
+    fs::write(folder.join("wrong.csv"), lines.concat()).unwrap();
+    let write = |rows: &str| {
+        let header = "name,left,right,max_disparity,prior,prior_sigma,prior_kind";
+        fs::write(folder.join("list.csv"), format!("{header}\n{rows}")).unwrap();
+    };
+    write(
+        "none,im0.png,im1.png,31,,,\npoints,im0.png,im1.png,31,lidar.csv,,\n\
+         surface,im0.png,im1.png,31,disp0GT.pfm,2,surface\n",
+    );
+    let told = batch(&folder, "list.csv out").succeeded();
+    assert_eq!(summary(&told), "mrfgs: 3 done, 0 skipped, 0 failed");
+    let at = |name: &str| fs::read(folder.join(name)).unwrap();
+    let flags = [
+        ("none", ""),
+        ("points", "--prior lidar.csv"),
+        ("surface", "--prior disp0GT.pfm --prior-sigma 2 --prior-kind surface"),
+    ];
+    for (name, flags) in flags {
+        run(&folder, &format!("match im0.png im1.png a.pfm --max-disparity 31 --device cpu {flags}"))
+            .succeeded();
+        assert!(at("a.pfm") == at(&format!("out/{name}.pfm")), "{name}");
+    }
+    assert_eq!(maps(&folder.join("out")).into_values().collect::<HashSet<_>>().len(), 3, "priors count");
+    let recorded = record(&folder.join("out"), "points");
+    assert_eq!(recorded["files"]["prior"], "lidar.csv");
+    assert_eq!(record(&folder.join("out"), "none")["files"].get("prior"), None);
+
+    // Another sigma, kind or file is another request; the same one is skipped.
+    let again = |rows: &str| {
+        write(rows);
+        summary(&batch(&folder, "list.csv out").succeeded()).to_owned()
+    };
+    let [done, skipped] = ["mrfgs: 1 done, 0 skipped, 0 failed", "mrfgs: 0 done, 1 skipped, 0 failed"];
+    assert_eq!(again("points,im0.png,im1.png,31,lidar.csv,,\n"), skipped);
+    assert_eq!(again("points,im0.png,im1.png,31,lidar.csv,0.5,\n"), done);
+    assert_eq!(again("points,im0.png,im1.png,31,lidar.csv,0.5,points\n"), done);
+    let fewer = String::from_utf8(at("lidar.csv")).unwrap().lines().take(200).collect::<Vec<_>>().join("\n");
+    fs::write(folder.join("lidar.csv"), fewer).unwrap();
+    assert_eq!(again("points,im0.png,im1.png,31,lidar.csv,0.5,points\n"), done);
+
+    // What the images contradict comes with a warning, and a bad file fails its own pair.
+    write("wrong,l.png,r.png,31,wrong.csv,,\ngone,im0.png,im1.png,31,gone.csv,,\n");
+    let told = batch(&folder, "list.csv out");
+    assert!(told.stderr.contains("wrong: warning: the images contradict it"), "{}", told.stderr);
+    assert!(told.stderr.contains("gone: cannot read gone.csv"), "{}", told.stderr);
+    assert!(told.stderr.contains("1 done, 0 skipped, 1 failed: gone"), "{}", told.stderr);
+    write("a,im0.png,im1.png,31,list.csv,,\n");
+    let told = batch(&folder, "list.csv out").stderr;
+    assert!(told.contains("a: prior: list.csv, line 2: not x,y,disparity"), "{told}");
+    for (row, words) in [
+        ("a,im0.png,im1.png,31,,2,\n", "line 2 & prior_sigma: there is no prior"),
+        ("a,im0.png,im1.png,31,lidar.csv,-1,\n", "line 2 & prior_sigma & above 0"),
+        ("a,im0.png,im1.png,31,lidar.csv,1,cloud\n", "line 2 & prior_kind: must be points or surface"),
+    ] {
+        write(row);
+        batch(&folder, "list.csv out").failed(1, &format!("list.csv & {words}"));
     }
 }
 

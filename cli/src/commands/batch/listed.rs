@@ -2,18 +2,19 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use mrfgs::Error;
 use mrfgs::depth::Rig;
 use mrfgs::image::read::Reader;
 use mrfgs::rectification::Options;
+use mrfgs::{Error, Prior};
 
-use crate::args::{CropArgs, Search, Sign};
+use crate::args::{CropArgs, PriorFile, Search, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, Files};
 use crate::pairs::folder::{self, CALIBRATION, Folder};
 use crate::pairs::input;
-use crate::pairs::list::{self, Names, Row};
+use crate::pairs::list::{self, Names, PriorRow, Row};
 
 /// A list of pairs.
 pub(super) struct List {
@@ -54,6 +55,7 @@ pub(super) struct LoadedPair {
     pub(super) input: input::Input,
     /// The cameras, if an output needs them.
     pub(super) rig: Option<Rig>,
+    pub(super) prior: Option<Arc<Prior>>,
     /// The paths, without the output.
     pub(super) files: Files,
 }
@@ -104,7 +106,7 @@ impl Listed {
     /// Every existing input file of the pair: paths from the list as written, paths from flags absolute.
     pub(super) fn inputs(&self, base: &Path, given: &BatchSettings) -> Vec<String> {
         let inputs = match &self.source {
-            Source::Row(Row { left, right, mask, calibration, max_disparity, .. }) => {
+            Source::Row(Row { left, right, mask, calibration, max_disparity, prior, .. }) => {
                 let takes_calibration = given.cameras.is_some() || max_disparity.is_none();
                 let beside = Some(calibration_beside(left))
                     .filter(|_| takes_calibration && calibration.is_empty() && given.calib.is_empty());
@@ -113,6 +115,7 @@ impl Listed {
                     .chain(right)
                     .chain(mask)
                     .chain(calibration)
+                    .chain(prior.as_ref().map(|prior| &prior.file))
                     .cloned()
                     .chain(beside)
                     .collect()
@@ -132,6 +135,14 @@ impl Listed {
     /// Whether the list gives a calibration for the pair.
     fn has_calibration(&self) -> bool {
         matches!(&self.source, Source::Row(row) if !row.calibration.is_empty())
+    }
+
+    /// What the list says of the scene.
+    pub(super) fn prior(&self) -> Option<&PriorRow> {
+        match &self.source {
+            Source::Row(row) => row.prior.as_ref(),
+            Source::Folder => None,
+        }
     }
 
     /// The range in the list.
@@ -193,8 +204,15 @@ impl Listed {
             Source::Row(_) => input.calibration_files().map(|_| calibration_beside(&left)),
             Source::Folder => Some(calibration_beside(&left)).filter(|path| at(path).exists()),
         };
-        let files = Files { left, right, mask, calibration, output: None };
-        Ok(LoadedPair { input, rig, files })
+        let prior = self.prior().map(|PriorRow { file, sigma, kind }| {
+            let names = ["prior", "prior_sigma", "prior_kind"];
+            let file = PriorFile { path: &at(file), sigma: *sigma, kind: *kind, names };
+            file.read(input.pair.size(), Sign::default())
+        });
+        let prior = prior.transpose()?;
+        let prior_file = self.prior().map(|prior| prior.file.clone());
+        let files = Files { left, right, mask, calibration, prior: prior_file, output: None };
+        Ok(LoadedPair { input, rig, prior, files })
     }
 
     /// The paths of the views in the folder `dir`, relative to the list.

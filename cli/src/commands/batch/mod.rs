@@ -23,6 +23,7 @@ use mrfgs::{Error, Matched, Matcher};
 
 use crate::args::Sign;
 use crate::failure::{self, Failure, Result};
+use crate::matching::prior_warning;
 use crate::outputs::{Claim, Format, MatchRecord, Outcome, also, files};
 use crate::progress::Counter;
 use crate::{console, remedy, stop};
@@ -284,7 +285,7 @@ impl<'a> Batch<'a> {
         let (request, record) = (self.request(listed), self.record(listed));
         write::check_path(&record)?;
         let (read, matched, time, warnings) = self.compute(listed, matcher)?;
-        let LoadedPair { input, rig, mut files } = read;
+        let LoadedPair { input, rig, mut files, .. } = read;
         let (range, rectifying) = (matched.range(), input.rectifying());
         let pair = input.pair;
         let wanted = &self.args.maps;
@@ -314,10 +315,15 @@ impl<'a> Batch<'a> {
         let mut warnings = input.warnings(&remedy::COLUMNS);
         let searched = input.searched(|wider| wanted.check(folder, &listed.name, wider).is_ok());
         let start = Instant::now();
-        let matched = searched.job(matcher, pair).on_progress(|_| stop::go_on()).run()?;
+        let matched = searched
+            .with_prior(read.prior.as_ref())
+            .job(matcher, pair)
+            .on_progress(|_| stop::go_on())
+            .run()?;
         let time = start.elapsed();
         let found = matched.warnings();
         warnings.extend(found.iter().map(|warning| remedy::warning(warning, &remedy::COLUMNS)));
+        warnings.extend(matched.prior.and_then(prior_warning));
         Ok((read, matched, time, warnings))
     }
 

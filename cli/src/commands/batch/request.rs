@@ -13,6 +13,7 @@ use serde_json::Value;
 use crate::args::Search;
 use crate::failure::{Failure, Result};
 use crate::outputs::{MatchRecord, files};
+use crate::pairs::list::PriorRow;
 use crate::remedy;
 
 use super::args::Args;
@@ -24,6 +25,8 @@ pub(super) struct Request<'a> {
     inputs: Vec<InputFile>,
     #[serde(flatten)]
     search: Search,
+    #[serde(flatten)]
+    prior: Option<PriorRow>,
     /// All flags except those that affect no output or are recorded elsewhere; these have `serde(skip)`.
     #[serde(flatten)]
     flags: &'a Args,
@@ -89,7 +92,13 @@ impl<'a> Request<'a> {
                 modified: modified.and_then(|time| u64::try_from(time.as_millis()).ok()),
             }
         });
-        Self { inputs: inputs.collect(), search: listed.search(), flags, outputs }
+        Self {
+            inputs: inputs.collect(),
+            search: listed.search(),
+            prior: listed.prior().cloned(),
+            flags,
+            outputs,
+        }
     }
 
     pub(super) fn outputs(&self) -> &[String] {

@@ -10,7 +10,9 @@ use mrfgs::sigma::Sigma;
 
 use crate::args::{CameraArgs, ExecutionArgs, MethodArgs, PriorArgs, RectificationArgs, RegionArgs, Sign};
 use crate::failure::{Failure, Result};
-use crate::outputs::{Also, AlsoArgs, InFront, MatchRecord, Outcome, View, Written, files, other_sign};
+use crate::outputs::{
+    Also, AlsoArgs, Files, InFront, MatchRecord, Outcome, View, Written, files, other_sign,
+};
 use crate::pairs::input::{self, Input, PairArgs};
 use crate::{console, matching, plan, stop};
 
@@ -98,7 +100,7 @@ pub(crate) struct Args {
     also: AlsoArgs,
     /// Writes a record of the match and its result as JSON; `-` prints it
     ///
-    /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `rectified`, `trust` (rectified without a
+    /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `prior`, `output`), `rectified`, `trust` (rectified without a
     /// calibration: `matches`, `agreeing`, `median` and `percentile95` of the row errors in pixels, `coverage` and `off_one_plane` from 0
     /// to 1), `region` (first column and row in LEFT, with --roi), `width`, `height`, `sign`, `range` (`min`, `max`), `labels`, `method`
     /// (every key), `ran_on`, `driver` (of the device), `note` (why another device was used), `tiles`, `moved_up` (shift of the right view
@@ -171,7 +173,8 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     }
     // Free its memory for the outputs.
     drop(matcher);
-    let files = args.pair.files(&input, Some(args.output()));
+    let prior_file = args.prior.file().map(|path| path.display().to_string());
+    let files = Files { prior: prior_file, ..args.pair.files(&input, Some(args.output())) };
     let unit = input.unit();
     let georeferences = pair.georeferences();
     let is_found = input.has_found_range();

@@ -151,6 +151,7 @@ impl Args {
             right: path(self.right.as_deref().unwrap_or(&self.left)),
             mask: self.mask.as_deref().map(path),
             calibration: input.calibration_files(),
+            prior: None,
             output: Some(path(&self.output)),
         }
     }
