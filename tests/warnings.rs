@@ -105,7 +105,7 @@ fn moved(image: &Image, from: impl Fn(i32, i32) -> (i32, i32)) -> Image {
 fn sound_pairs_get_no_warning() {
     for case in cases() {
         assert_eq!(check::warnings(&case.pair, Some(case.range)), [], "{}", case.name);
-        assert_eq!(check::warnings_of(&case.maps(case.range), case.range), [], "{}", case.name);
+        assert_eq!(check::warnings_of(&case.maps(case.range), case.range, 2), [], "{}", case.name);
         // A small change of brightness is harmless.
         for (gain, offset) in [(0.72, 14.0), (0.5, 0.0), (1.0, 20.0), (1.0, -20.0)] {
             assert_eq!(case.exposed(|v| gain * v + offset), [], "{}, {gain} {offset}", case.name);
@@ -237,7 +237,7 @@ fn an_automatic_range_is_widened() {
 fn a_range_that_clips_the_scene_is_warned_about() {
     for case in cases() {
         // The range excludes a tenth or a third of the true disparities; some surfaces end just there.
-        let told = |range: DisparityRange| check::warnings_of(&case.maps(range), range);
+        let told = |range: DisparityRange| check::warnings_of(&case.maps(range), range, 2);
         let ends = |warnings: &[Warning], at_top: bool| {
             warnings.iter().any(|w| matches!(w, Warning::Clipped { upper, .. } if *upper == at_top))
         };
@@ -259,7 +259,7 @@ fn a_range_that_clips_the_scene_is_warned_about() {
         for map in [&maps.raw, &maps.disparity] {
             assert!(map.data().iter().all(|d| (0..=max * FRACTION).contains(d)), "0 to {max}");
         }
-        check::warnings_of(&maps, range)
+        check::warnings_of(&maps, range, 1)
     };
     assert!(matches!(told(20)[..], [Warning::Clipped { end: 20, upper: true, percent: 20..35 }]));
     assert_eq!(told(case.range.max), []);
@@ -267,10 +267,39 @@ fn a_range_that_clips_the_scene_is_warned_about() {
     let case = Case::scene("mixed");
     let mut maps = case.maps(case.range);
     maps.raw = Plane::filled(case.pair.size().0, case.pair.size().1, 0);
-    assert_eq!(check::warnings_of(&maps, case.range), []);
-    assert_eq!(check::warnings_of(&maps, DisparityRange::new(0, 0).unwrap()), []);
-    let told = check::warnings_of(&maps, DisparityRange::new(-9, 0).unwrap());
+    assert_eq!(check::warnings_of(&maps, case.range, 2), []);
+    assert_eq!(check::warnings_of(&maps, DisparityRange::new(0, 0).unwrap(), 2), []);
+    let told = check::warnings_of(&maps, DisparityRange::new(-9, 0).unwrap(), 2);
     assert_eq!(told, [Warning::Clipped { end: 0, upper: true, percent: 100 }]);
+}
+
+/// Guesses make noise agree, but with little confidence.
+#[test]
+fn views_of_noise_hardly_match_with_one_look_or_two() {
+    let mut seed = 7u64;
+    let mut noise = || {
+        // SplitMix64, since channels and pixels must not depend on each other.
+        let pixels = Plane::from_fn(300, 200, |_, _| {
+            seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mixed = (seed ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            [0, 16, 32].map(|shift| (mixed >> shift) as u8)
+        });
+        Image::from_rgb8(&pixels)
+    };
+    let pair = Pair::new(noise(), noise()).unwrap();
+    let range = DisparityRange::new(0, 15).unwrap();
+    for looks in [1, 2] {
+        let mut method = Method::default();
+        method.schedule.looks = looks;
+        let mut matcher = Matcher::builder().method(method).device("cpu").build().unwrap();
+        let matched = matcher.run(&pair, range).unwrap();
+        let warnings = matched.warnings();
+        assert!(matches!(warnings[..], [Warning::HardlyMatch { .. }]), "{looks}: {warnings:?}");
+        // Control: after two looks, the pixels that agree are too many.
+        let all = check::warnings_of(&matched.maps, range, 1);
+        assert_eq!(matches!(all[..], [Warning::HardlyMatch { .. }]), looks == 1, "{looks}: {all:?}");
+    }
 }
 
 #[test]

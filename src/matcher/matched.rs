@@ -126,7 +126,7 @@ impl Matched {
     /// The likely faults of the pair or the range, from the maps.
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
-        let mut warnings = check::warnings_of(&self.maps, self.range());
+        let mut warnings = check::warnings_of(&self.maps, self.range(), self.plan.looks());
         // Distant surfaces have sparse matches, so disparities at the lower end of a found range are errors.
         warnings.retain(|w| !self.range_found || !matches!(w, Warning::Clipped { upper: false, .. }));
         warnings
