@@ -46,7 +46,7 @@ mod tests {
         assert!(Claim::new(share).is_err(), "both together are too much");
         assert!(Claim::new(u64::MAX).is_err());
         drop(first);
-        assert_eq!(CLAIMED.get().load(Ordering::Relaxed), 0);
+        // Other tests claim memory at the same time, so only this shows that the first claim is gone.
         drop(Claim::new(share).unwrap());
     }
 }
