@@ -43,10 +43,10 @@ const CLIPPED_PERCENT: usize = 2;
 /// noise, and one 20 rows off, 202 of 208 have less than this with one look, and 194 with `fast`.
 const MEASURED_PERCENT: usize = 35;
 /// After a second look, only pixels with at least this confidence count as found in both views (open). Guesses
-/// make pixels agree by chance: of two views of noise with 16 labels, 49 % agree, but 19 % with this
-/// confidence (26 % with one look). Sound pairs have 51 % or more with it, rendered ones with plain walls 47 %,
-/// and 16 rendered pairs with an inverted view 8 to 32 %.
-const FOUND_CONFIDENCE: u8 = 24;
+/// make pixels agree by chance: of two views of noise with 16 labels, 49 % agree, but 28 % with this
+/// confidence (26 % with one look). Sound pairs have 54 % or more with it, rendered ones with plain walls 50 %
+/// (small parts of a wall 36 %), and 16 rendered pairs with an inverted view 10 to 35 %.
+const FOUND_CONFIDENCE: u8 = 20;
 /// Percentage of masked pixels from which on the mask is to blame if few of the others are found (open).
 const MASKED_PERCENT: usize = 50;
 /// Ranges with fewer labels consist of ends only.
@@ -354,10 +354,10 @@ pub(super) fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warni
 /// The likely faults of a match over `range` that gave `maps` after this number of
 /// [`looks`](crate::options::ScheduleOptions::looks).
 ///
-/// - Hardly match: fewer than 35 % of the unmasked pixels were found in both views; after a second look, only pixels
-///   with a confidence of at least 24 count. If at least half of the
-///   left view is masked, the warning is "little left": pixels next to masked ones are often not found, nor
-///   are those whose match is outside the right view. No other warning is given then.
+/// - Hardly match: fewer than 35 % of the unmasked pixels were found in both views. After a second look, only
+///   pixels with a confidence of at least 20 count. If at least half of the left view is masked, the warning is
+///   "little left": pixels next to masked ones are often not found, nor are those whose match is outside the
+///   right view. No other warning is given then.
 /// - Clipped: many disparities are at an end of the range, so it probably cuts off part of the scene. A lower
 ///   end of 0, the horizon of parallel cameras, does not count.
 #[must_use]

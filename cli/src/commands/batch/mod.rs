@@ -449,10 +449,12 @@ mod tests {
         let row = |column: &str| match column {
             "name" => "b",
             "left" | "right" => "other.png",
-            "mask" => "mask.png",
+            "mask" | "prior" => "mask.png",
             "calibration" => "one.yml",
             "max_disparity" => "40",
             "min_disparity" => "-3",
+            "prior_sigma" => "2",
+            "prior_kind" => "surface",
             other => panic!("{other} is not in the table"),
         };
         let of = |changed: &str| {
@@ -461,6 +463,8 @@ mod tests {
                 "name" => "a",
                 "left" => "left.png",
                 "right" => "right.png",
+                // Sigma and kind belong to a prior.
+                "prior" => "other.png",
                 _ => "",
             });
             let text = format!("{}\n{}\n", list::COLUMNS.join(","), values.join(","));
