@@ -32,12 +32,13 @@ use super::{Data, Descriptor, Map, maps};
 
 /// The largest cost of a guess, in units: 1.25 nats.
 pub(crate) const GUESS_CAP: u8 = 5;
-/// What a guess loses of its cap from a level to the next coarser one, in units: half a nat.
+/// The largest cost of a guess is smaller by this at each coarser level, in units: half a nat.
 pub(crate) const GUESS_FADE: u8 = 2;
 /// The cost of a guess per label, in 1/16 unit: one nat.
 pub(crate) const GUESS_SLOPE: u32 = 64;
 
-/// What a prior with this cap counts in the cap of the next coarser level.
+/// The share of a prior with this `cap` in the mean cap of the next coarser level: a guess loses [`GUESS_FADE`], and a prior of the
+/// caller, whose cap is larger than [`GUESS_CAP`], loses nothing.
 pub(crate) const fn faded(cap: u8) -> u8 {
     if cap > GUESS_CAP { cap } else { cap.saturating_sub(GUESS_FADE) }
 }

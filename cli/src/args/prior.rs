@@ -54,9 +54,12 @@ impl PriorArgs {
 
     /// Reads the prior for a left view of (width, height) pixels, with disparities by `sign`.
     pub(crate) fn read(&self, size: (usize, usize), sign: Sign) -> Result<Option<Arc<Prior>>> {
-        let Self { prior_sigma, prior_kind, .. } = *self;
-        let names = ["--prior", "--prior-sigma", "--prior-kind"];
-        let file = self.file().map(|path| PriorFile { path, sigma: prior_sigma, kind: prior_kind, names });
+        let Self { prior_sigma: sigma, prior_kind: kind, .. } = *self;
+        if let Some(sigma) = sigma.filter(|sigma| !(*sigma > 0.0 && sigma.is_finite())) {
+            return Err(Failure::usage("--prior-sigma", format!("{sigma} is not above 0")));
+        }
+        let names = ["--prior", "--prior-kind"];
+        let file = self.file().map(|path| PriorFile { path, sigma, kind, names });
         file.map(|file| file.read(size, sign)).transpose()
     }
 }
@@ -64,23 +67,21 @@ impl PriorArgs {
 /// A file of known disparities, and how to use it.
 pub(crate) struct PriorFile<'a> {
     pub(crate) path: &'a Path,
+    /// Standard deviation in pixels, above 0; `None` for the usual one.
     pub(crate) sigma: Option<f64>,
     pub(crate) kind: Option<Kind>,
-    /// The flags or columns that gave file, sigma and kind.
-    pub(crate) names: [&'static str; 3],
+    /// The flags or columns that gave file and kind, for messages.
+    pub(crate) names: [&'static str; 2],
 }
 
 impl PriorFile<'_> {
     /// Reads the prior for a left view of (width, height) pixels, with disparities by `sign`.
     pub(crate) fn read(&self, size: (usize, usize), sign: Sign) -> Result<Arc<Prior>> {
-        if let Some(sigma) = self.sigma.filter(|sigma| !(*sigma > 0.0 && sigma.is_finite())) {
-            return Err(Failure::usage(self.names[1], format!("{sigma} is not above 0")));
-        }
         let prior = if is_list(self.path) { self.listed(size, sign) } else { self.map(size, sign) };
         prior.map(Arc::new)
     }
 
-    /// Sigma, or the usual one of this kind.
+    /// The given standard deviation, or the usual one of a prior of this kind.
     fn sigma_of(&self, kind: PriorKind) -> f64 {
         self.sigma.unwrap_or(kind.usual_sigma())
     }
@@ -92,7 +93,7 @@ impl PriorFile<'_> {
         })
     }
 
-    /// A failure that names the file.
+    /// A failure that names the file; `reason` follows directly, with its punctuation.
     fn refused(&self, reason: impl Display) -> Failure {
         Failure::usage(self.names[0], format!("{}{reason}", self.path.display()))
     }
@@ -120,7 +121,7 @@ impl PriorFile<'_> {
         let path = self.path;
         if self.kind() == Some(PriorKind::Surface) {
             let reason = format!("{} holds points; give a map for a surface", path.display());
-            return Err(Failure::usage(self.names[2], reason));
+            return Err(Failure::usage(self.names[1], reason));
         }
         let text = text::read(path, MOST_BYTES, "a list of points")?;
         let mut reader =

@@ -19,7 +19,7 @@ pub(crate) struct Files {
     pub(crate) right: String,
     pub(crate) mask: Option<String>,
     pub(crate) calibration: Option<String>,
-    /// The file of what is known of the scene.
+    /// The file of known disparities of the left view; `None` without a prior.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) prior: Option<String>,
     /// `None` if no map is written.

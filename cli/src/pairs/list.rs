@@ -56,11 +56,11 @@ pub struct Row {
     pub max_disparity: Option<Largest>,
     /// Smallest disparity to search, in pixels, if given; at most the largest.
     pub min_disparity: Option<i32>,
-    /// What is known of the scene, if anything is.
+    /// The known disparities of the left view, if the row names a file with them.
     pub prior: Option<PriorRow>,
 }
 
-/// What is known of the scene of a pair.
+/// A file of known disparities of the left view, and how to use it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PriorRow {
     /// Path of the file, as written in the list.
@@ -69,7 +69,7 @@ pub struct PriorRow {
     /// Standard deviation in pixels, if given; above 0.
     #[serde(rename = "prior_sigma")]
     pub sigma: Option<f64>,
-    /// How to use it, if given.
+    /// As points or as a surface, if given.
     #[serde(rename = "prior_kind")]
     pub kind: Option<PriorKind>,
 }

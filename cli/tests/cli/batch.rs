@@ -159,7 +159,7 @@ fn a_list_may_tell_what_is_known_of_each_scene() {
     fs::write(folder.join("lidar.csv"), fewer).unwrap();
     assert_eq!(again("points,im0.png,im1.png,31,lidar.csv,0.5,points\n"), done);
 
-    // What the images contradict comes with a warning, and a bad file fails its own pair.
+    // A prior that the images contradict gives a warning. A prior that cannot be read fails only its own pair.
     write("wrong,l.png,r.png,31,wrong.csv,,\ngone,im0.png,im1.png,31,gone.csv,,\n");
     let told = batch(&folder, "list.csv out");
     assert!(told.stderr.contains("wrong: warning: the images contradict it"), "{}", told.stderr);

@@ -100,7 +100,7 @@ pub(crate) fn guessed(
 }
 
 /// The prior of a level from that of the next finer one: the smallest interval that holds those of all known children, with twice
-/// their mean slope, because a label is twice as wide, and their mean cap, which [fades](faded) if they are guesses. Coarse label k stands for fine labels
+/// their mean slope, because a label is twice as wide, and the mean of their [faded] caps. Coarse label k stands for fine labels
 /// 2 k + `offset` - 1 ..= 2 k + `offset` + 1.
 pub(crate) fn coarser(fine: &Plane<LabelPrior>, level: &LevelPlan, offset: i32) -> Plane<LabelPrior> {
     let (width, height) = fine.size();

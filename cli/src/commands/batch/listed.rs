@@ -137,7 +137,7 @@ impl Listed {
         matches!(&self.source, Source::Row(row) if !row.calibration.is_empty())
     }
 
-    /// What the list says of the scene.
+    /// The known disparities of the left view that the list names, if any.
     pub(super) fn prior(&self) -> Option<&PriorRow> {
         match &self.source {
             Source::Row(row) => row.prior.as_ref(),
@@ -205,7 +205,7 @@ impl Listed {
             Source::Folder => Some(calibration_beside(&left)).filter(|path| at(path).exists()),
         };
         let prior = self.prior().map(|PriorRow { file, sigma, kind }| {
-            let names = ["prior", "prior_sigma", "prior_kind"];
+            let names = ["prior", "prior_kind"];
             let file = PriorFile { path: &at(file), sigma: *sigma, kind: *kind, names };
             file.read(input.pair.size(), Sign::default())
         });

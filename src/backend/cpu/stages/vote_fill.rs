@@ -64,7 +64,7 @@ fn around(at: usize, count: usize) -> std::ops::Range<usize> {
     (at / 2).saturating_sub(1)..(at / 2 + 2).min(count)
 }
 
-/// The place of a vote that does not exist.
+/// Stands for the vote of a half-size pixel that has none.
 const NO_VOTE: i32 = i32::MIN;
 
 /// The votes of the half-size pixels that are needed, in 1/256 px, or [`NO_VOTE`].
