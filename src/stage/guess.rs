@@ -37,8 +37,8 @@ pub(crate) const GUESS_FADE: u8 = 2;
 /// The cost of a guess per label, in 1/16 unit: one nat.
 pub(crate) const GUESS_SLOPE: u32 = 64;
 
-/// The share of a prior with this `cap` in the mean cap of the next coarser level: a guess loses [`GUESS_FADE`], and a prior of the
-/// caller, whose cap is larger than [`GUESS_CAP`], loses nothing.
+/// The cap with which a prior of this `cap` enters the mean cap of the next coarser level. A guess loses [`GUESS_FADE`]. A prior of
+/// the caller, whose cap is larger than [`GUESS_CAP`], loses nothing.
 pub(crate) const fn faded(cap: u8) -> u8 {
     if cap > GUESS_CAP { cap } else { cap.saturating_sub(GUESS_FADE) }
 }

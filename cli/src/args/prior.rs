@@ -70,7 +70,7 @@ pub(crate) struct PriorFile<'a> {
     /// Standard deviation in pixels, above 0; `None` for the usual one.
     pub(crate) sigma: Option<f64>,
     pub(crate) kind: Option<Kind>,
-    /// The flags or columns that gave file and kind, for messages.
+    /// The flags or columns that name the file and its kind, for messages.
     pub(crate) names: [&'static str; 2],
 }
 

@@ -69,7 +69,7 @@ pub struct PriorRow {
     /// Standard deviation in pixels, if given; above 0.
     #[serde(rename = "prior_sigma")]
     pub sigma: Option<f64>,
-    /// As points or as a surface, if given.
+    /// Whether the known disparities count as points or as a surface, if the row says so.
     #[serde(rename = "prior_kind")]
     pub kind: Option<PriorKind>,
 }
