@@ -69,7 +69,7 @@ fn focal_length(text: &str) -> Result<f64, String> {
 }
 
 /// A number above 0.
-pub(super) fn above_zero(text: &str) -> Option<f64> {
+pub(crate) fn above_zero(text: &str) -> Option<f64> {
     text.parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite())
 }
 

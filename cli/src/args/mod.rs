@@ -11,7 +11,7 @@ mod region;
 pub(crate) mod search;
 mod sign;
 
-pub(crate) use cameras::CameraArgs;
+pub(crate) use cameras::{CameraArgs, above_zero};
 pub(crate) use execution::{ExecutionArgs, ThreadArgs};
 pub(crate) use method::MethodArgs;
 pub use prior::Kind as PriorKind;

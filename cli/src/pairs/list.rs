@@ -15,6 +15,7 @@ use mrfgs::{Error, Result};
 use serde::Serialize;
 
 pub use crate::args::PriorKind;
+use crate::args::above_zero;
 pub use crate::args::search::{Largest, pixels};
 use crate::outputs::also;
 use crate::remedy;
@@ -186,8 +187,7 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
 
 /// A standard deviation in pixels.
 fn sigma(field: &str) -> std::result::Result<f64, String> {
-    let sigma = field.parse().ok().filter(|sigma: &f64| *sigma > 0.0 && sigma.is_finite());
-    sigma.ok_or_else(|| format!("{} is not a number above 0", quoted(field)))
+    above_zero(field).ok_or_else(|| format!("{} is not a number above 0", quoted(field)))
 }
 
 /// The names of pairs so far, each valid as a file name on every file system: without / \ : * ? " < > | and control characters, no leading
