@@ -7,6 +7,9 @@ mod claims;
 pub(crate) use claims::Claim;
 
 use crate::error::{MemoryError, Purpose, Result};
+use std::sync::Mutex;
+use std::time::Duration;
+use web_time::Instant;
 
 /// Bytes that are available without swapping, if the system tells.
 #[cfg(not(target_arch = "wasm32"))]
@@ -24,6 +27,27 @@ fn available() -> Option<u64> {
     None
 }
 
+/// How long a reading of the available memory counts: to read it again for each of several checks of a pair would
+/// take longer than other work of the host.
+const COUNTS: Duration = Duration::from_secs(1);
+
+/// When the available memory was read, and what is left of it after all that was granted since.
+static READING: Mutex<Option<(Instant, u64)>> = Mutex::new(None);
+
+/// Bytes that are available, if the system tells: exactly if that may decide whether there is room for `asked`
+/// bytes, otherwise by the last reading.
+fn available_for(asked: u64) -> Option<u64> {
+    // A lock that a fork has copied while it was held is never free again.
+    let Ok(mut reading) = READING.try_lock() else { return available() };
+    let recent = reading.filter(|(read, left)| read.elapsed() < COUNTS && left / 2 >= asked);
+    let (read, free) = match recent {
+        Some(recent) => recent,
+        None => (Instant::now(), available()?),
+    };
+    *reading = Some((read, free.saturating_sub(asked)));
+    Some(free)
+}
+
 /// Address space that the next allocation of a thread may take: glibc reserves a heap of this size for each
 /// thread.
 const HEAP: usize = if cfg!(all(target_os = "linux", target_env = "gnu")) { 64 << 20 } else { 0 };
@@ -34,7 +58,7 @@ const HEAP: usize = if cfg!(all(target_os = "linux", target_env = "gnu")) { 64 <
 /// # Errors
 /// [`MemoryError::Machine`] with both figures, if both are known.
 pub(crate) fn check(bytes: u64, purpose: Purpose) -> Result<(), MemoryError> {
-    if let Some(free) = available().filter(|free| bytes > *free) {
+    if let Some(free) = available_for(bytes).filter(|free| bytes > *free) {
         return Err(MemoryError::Machine { needed: bytes, available: Some(free), purpose });
     }
     // Catches limits of the process (`ulimit -v`) and systems that do not overcommit. Untouched memory costs nothing.

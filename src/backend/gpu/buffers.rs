@@ -12,6 +12,22 @@ use crate::stage::{Array, Data, Extent, Map, Place, Start, Volume};
 use std::array;
 use std::collections::HashMap;
 
+/// The maps that a stage computes anew while it reads them, and where their successors are written.
+const SUCCESSORS: [(Map, Data); 2] =
+    [(Map::Disparity, Data::NextDisparity), (Map::Validity, Data::NextFlags)];
+
+/// Whether each of these maps is in the memory of its successor, and the successor in that of the map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Exchanged([bool; SUCCESSORS.len()]);
+
+impl Exchanged {
+    /// Makes the successor of `map` the map.
+    pub(super) fn exchange(&mut self, map: Map) {
+        let at = SUCCESSORS.iter().position(|(of, _)| *of == map).expect("the map has a successor");
+        self.0[at] ^= true;
+    }
+}
+
 /// All buffers of a match on a device.
 pub(super) struct Buffers {
     /// The finest level that shares buffers with all coarser ones; the number of levels if none does.
@@ -20,6 +36,10 @@ pub(super) struct Buffers {
     pub(super) levels: Vec<LevelParams>,
     /// Every array by name and level.
     arrays: HashMap<(&'static str, usize), (Array, Rows)>,
+    /// The maps that are in the memory of their successors now.
+    pub(super) exchanged: Exchanged,
+    /// The rows of each array that moves with an exchange while it is elsewhere, and the index of the exchange.
+    elsewhere: HashMap<&'static str, (usize, Rows)>,
     /// Bound in place of missing arrays, because WGSL bindings cannot be absent.
     nothing: wgpu::Buffer,
     /// Workgroup counts of the dispatches that end once the label map has settled: current and initial ones.
@@ -163,7 +183,9 @@ impl Buffers {
         Ok(Self {
             finest_shared,
             levels,
+            elsewhere: Self::elsewhere(plan, &arrays),
             arrays,
+            exchanged: Exchanged::default(),
             nothing: a.buffer("nothing", 0)?,
             groups: a.buffer("groups", 0)?,
             all_groups: a.constant("groups", &[])?,
@@ -223,14 +245,50 @@ impl Buffers {
         pools.collect()
     }
 
-    /// The array that is bound as `name` at `level`, if it exists; see [`Data::bound`].
-    pub(super) fn named(&self, name: &'static str, level: usize) -> Option<&(Array, Rows)> {
-        self.arrays.get(&Data::place_of(name, level))
+    /// The rows of maps in the memory of their successors, and of all that is in it in the memory of the maps.
+    fn elsewhere(
+        plan: &Plan,
+        arrays: &HashMap<(&'static str, usize), (Array, Rows)>,
+    ) -> HashMap<&'static str, (usize, Rows)> {
+        let rows = |data: Data| arrays.get(&(data.array(plan).name, 0)).map(|(_, rows)| rows);
+        let mut elsewhere = HashMap::new();
+        for (at, (map, next)) in SUCCESSORS.into_iter().enumerate() {
+            let (Some(of_map), Some(of_next)) = (rows(Data::Map(map)), rows(next)) else { continue };
+            elsewhere.insert(Data::Map(map).array(plan).name, (at, of_next.clone()));
+            let next_name = next.array(plan).name;
+            let moves = |array: &Array| array.name == next_name || array.place == Place::In(next);
+            let moving = arrays.values().filter(|(array, _)| moves(array));
+            elsewhere.extend(moving.map(|(array, _)| (array.name, (at, of_map.clone()))));
+        }
+        elsewhere
     }
 
-    /// The array of `data`, which must exist.
+    /// The array at a place of [`Self::arrays`] while `exchanged`.
+    fn at(&self, place: (&'static str, usize), exchanged: Exchanged) -> Option<(&Array, &Rows)> {
+        let (array, rows) = self.arrays.get(&place)?;
+        let elsewhere = self.elsewhere.get(array.name).filter(|(at, _)| exchanged.0[*at]);
+        Some((array, elsewhere.map_or(rows, |(_, rows)| rows)))
+    }
+
+    /// The array that is bound as `name` at `level` while `exchanged`, if it exists; see [`Data::bound`].
+    pub(super) fn named(
+        &self,
+        name: &'static str,
+        level: usize,
+        exchanged: Exchanged,
+    ) -> Option<(&Array, &Rows)> {
+        self.at(Data::place_of(name, level), exchanged)
+    }
+
+    /// The array of `data`, which must exist, while `exchanged`.
+    pub(super) fn rows_while(&self, plan: &Plan, data: Data, exchanged: Exchanged) -> &Rows {
+        let place = (data.array(plan).name, data.level().unwrap_or(0));
+        self.at(place, exchanged).expect("the plan has the array").1
+    }
+
+    /// The array of `data`, which must exist, as of now.
     pub(super) fn rows(&self, plan: &Plan, data: Data) -> &Rows {
-        &self.arrays[&(data.array(plan).name, data.level().unwrap_or(0))].1
+        self.rows_while(plan, data, self.exchanged)
     }
 
     /// The array of `volume`, which must exist.

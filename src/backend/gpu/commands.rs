@@ -1,6 +1,6 @@
 //! Records stages as dispatches, in bands of rows if a buffer exceeds the largest binding of the device.
 
-use super::buffers::Buffers;
+use super::buffers::{Buffers, Exchanged};
 use super::device::{Device, ONE_ROW};
 use super::kernel::{Bound, Kernel, MAX_LOOP_ITERATIONS};
 use super::rows::{Binding, Copy, Rows, with_halo};
@@ -9,7 +9,7 @@ use super::uniform::{self, Band, Header, Layout, LevelParams};
 use crate::error::{DeviceError, Result};
 use crate::plan::{LevelPlan, Plan};
 use crate::program::Sent;
-use crate::stage::{Data, Extent, Volume};
+use crate::stage::{Data, Extent, Map, Volume};
 use bytemuck::bytes_of;
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -20,6 +20,8 @@ pub(super) enum Command {
     Copy(Copy),
     /// Zeroes a range of bytes.
     Clear(wgpu::Buffer, Range<u64>),
+    /// Makes the successor of a map the map.
+    Exchange(Map),
 }
 
 pub(super) struct Dispatch {
@@ -92,6 +94,8 @@ pub(super) struct Recorder<'a> {
     pub(super) pipelines: &'a mut Pipelines,
     pub(super) plan: &'a Plan,
     pub(super) buffers: &'a Buffers,
+    /// The maps that are in the memory of their successors after the commands so far.
+    pub(super) exchanged: Exchanged,
     pub(super) level: usize,
     /// The rows of the level to record; `None` for all.
     pub(super) only: Option<Range<u32>>,
@@ -107,7 +111,7 @@ pub(super) struct Recorder<'a> {
 impl<'a> Recorder<'a> {
     /// The array of `data`.
     pub(super) fn array(&self, data: Data) -> &'a Rows {
-        self.buffers.rows(self.plan, data)
+        self.buffers.rows_while(self.plan, data, self.exchanged)
     }
 
     /// The messages that exist at level `z` of the run.
@@ -151,7 +155,7 @@ impl<'a> Recorder<'a> {
 
     /// The array for a binding of `kernel`, and its rows if the kernel runs over `rows`; `None` if it does not exist.
     fn place(&self, kernel: &Kernel, bound: &Bound, rows: &Range<u32>) -> Option<(&'a Rows, Range<u32>)> {
-        let (array, held) = self.buffers.named(bound.data, self.level_of(kernel))?;
+        let (array, held) = self.buffers.named(bound.data, self.level_of(kernel), self.exchanged)?;
         let is_source = bound.name.starts_with("source_");
         let rows = self.source.as_ref().filter(|_| is_source).unwrap_or(rows);
         let shown = array.extent.rows_of(self.plan, rows, self.extent_of(kernel), bound.around);
@@ -183,6 +187,12 @@ impl<'a> Recorder<'a> {
         dispatches(&mut self.commands, &mut |share| shares += *share);
         dispatches(&mut self.commands, &mut |share| *share = (work * *share as f64 / shares as f64) as u64);
         self.commands
+    }
+
+    /// Makes the successor of `map`, which is complete, the map.
+    pub(super) fn exchange(&mut self, map: Map) {
+        self.exchanged.exchange(map);
+        self.commands.push(Command::Exchange(map));
     }
 
     /// Replaces an array by its successor.
@@ -318,7 +328,7 @@ impl<'a> Recorder<'a> {
         let sections: Vec<_> = sections.collect();
         // The shared buffers contain all of the levels.
         let bound = kernel.bound.iter().map(|bound| {
-            let named = levels.clone().find_map(|z| self.buffers.named(bound.data, z));
+            let named = levels.clone().find_map(|z| self.buffers.named(bound.data, z, self.exchanged));
             named.map_or_else(|| self.buffers.nothing(), |(_, rows)| rows.whole())
         });
         let bindings: Vec<_> = bound.collect();

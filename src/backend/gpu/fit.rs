@@ -1,5 +1,6 @@
 //! Fits programs to a device: the rows of level 0 that it holds, and the commands of each run.
 
+use super::buffers::Exchanged;
 use super::commands::Pipeline;
 use super::{Command, Gpu, MAX_LOOP_ITERATIONS, State, kernels, other_kernels};
 use crate::error::{Purpose, Result};
@@ -62,7 +63,9 @@ impl Gpu {
     /// The commands of `run`, recorded on first use. Their messages count as sent from now on.
     pub(super) fn commands_of(&mut self, run: &Run) -> Result<Arc<[Command]>> {
         let mut state = self.state.take().expect("prepare comes before every stage");
-        let of_run = (run.clone(), sent(&state, run));
+        let exchanged =
+            if run.stage.passes_messages() { Exchanged::default() } else { state.buffers.exchanged };
+        let of_run = (run.clone(), sent(&state, run), exchanged);
         let commands = if let Some(commands) = state.commands.get(&of_run) {
             Ok(Arc::clone(commands))
         } else {

@@ -45,7 +45,7 @@ pub(crate) use adapters::has_automatic_async;
 pub use adapters::may_have_gpu;
 #[cfg(not(target_arch = "wasm32"))]
 pub use adapters::{devices, has_automatic};
-use buffers::Buffers;
+use buffers::{Buffers, Exchanged};
 use commands::{Command, Pipelines, Recorder};
 use convergence::Convergence;
 use device::Device;
@@ -79,8 +79,9 @@ pub struct Gpu {
     requests: Requests<RequestedMaps>,
 }
 
-/// The commands of each run, by the messages that exist at each of its levels; none listed if all do.
-type Commands = HashMap<(Run, Vec<Sent>), Arc<[Command]>>;
+/// The commands of each run, by the messages that exist at each of its levels (none listed if all do), and by
+/// the maps that are in the memory of their successors (none for stages of messages, which bind no such map).
+type Commands = HashMap<(Run, Vec<Sent>, Exchanged), Arc<[Command]>>;
 
 /// Everything that depends on the plan.
 struct State {
@@ -90,7 +91,7 @@ struct State {
     /// The messages that were sent. All others count as 0, whatever is stored.
     messages: SentMessages,
     /// The commands that unpack the uploaded pair.
-    upload: HashMap<Unpacking, Arc<[Command]>>,
+    upload: HashMap<(Unpacking, Exchanged), Arc<[Command]>>,
     /// Words of an image, for upload.
     words: Vec<u32>,
 }
@@ -150,7 +151,7 @@ impl Gpu {
             for levels in 1..=most {
                 let run = Run { levels, ..stage.into() };
                 let recorded = self.recorded(&run, &[], plan, buffers, Some(&mut endings))?;
-                commands.insert((run, Vec::new()), recorded);
+                commands.insert((run, Vec::new(), Exchanged::default()), recorded);
             }
         }
         buffers.end_when_settled(&mut self.device, plan, &endings)?;
@@ -193,6 +194,7 @@ impl Gpu {
             pipelines,
             plan,
             buffers,
+            exchanged: buffers.exchanged,
             level,
             only: None,
             sent: Vec::new(),
@@ -238,7 +240,7 @@ impl Gpu {
             Some(mut state) if plan.fits(&state.plan) => {
                 if state.plan.core != plan.core {
                     state.plan = plan.clone();
-                    state.commands.retain(|(run, _), _| run.stage != Stage::RightView);
+                    state.commands.retain(|(run, ..), _| run.stage != Stage::RightView);
                 }
                 state
             }
@@ -331,7 +333,7 @@ impl Gpu {
     /// Unpacks the uploaded pair.
     fn unpack(&mut self, state: &mut State, unpacking: Unpacking) -> Result<()> {
         let State { plan, buffers, upload, .. } = state;
-        let commands = if let Some(commands) = upload.get(&unpacking) {
+        let commands = if let Some(commands) = upload.get(&(unpacking, buffers.exchanged)) {
             Arc::clone(commands)
         } else {
             let record = |recorder: &mut Recorder| record_upload(recorder, unpacking);
@@ -341,7 +343,7 @@ impl Gpu {
         let timer = self.timer.take();
         let recorded = self.record(&commands);
         self.timer = timer;
-        upload.insert(unpacking, commands);
+        upload.insert((unpacking, buffers.exchanged), commands);
         recorded
     }
 

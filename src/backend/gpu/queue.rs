@@ -49,6 +49,10 @@ impl Gpu {
                 }
                 Command::Clear(buffer, bytes) => self.clear(buffer, bytes)?,
                 Command::Dispatch(dispatch) => self.dispatch(dispatch)?,
+                Command::Exchange(map) => {
+                    let state = self.state.as_mut().expect("a stage has a state to run on");
+                    state.buffers.exchanged.exchange(*map);
+                }
             }
         }
         if self.timer.is_some() {

@@ -4,7 +4,7 @@ use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
 use crate::error::Result;
 use crate::options::Nearer;
-use crate::stage::{Data, Map};
+use crate::stage::Map;
 
 shader! {
     "fill"(plan, level) { source_first_row: u32, source_rows: u32, farther_is_larger: u32 }
@@ -31,7 +31,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         r.rows(&fill(plan, 0), &own, l.width)?;
     }
     r.source = None;
-    r.replace(Data::Map(Map::Disparity), Data::NextDisparity);
-    r.replace(Data::Map(Map::Validity), Data::NextFlags);
+    r.exchange(Map::Disparity);
+    r.exchange(Map::Validity);
     Ok(())
 }

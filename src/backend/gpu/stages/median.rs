@@ -9,7 +9,7 @@ use crate::backend::gpu::uniform::layout;
 use crate::error::Result;
 use crate::options::Median;
 use crate::plan::Plan;
-use crate::stage::{Data, Map};
+use crate::stage::Map;
 use crate::weights::MedianWeights;
 
 layout! {
@@ -87,6 +87,6 @@ pub(super) fn smooth(
     };
     let width = r.params().width;
     r.rows(kernel, &own, width)?;
-    r.replace(Data::Map(Map::Disparity), Data::NextDisparity);
+    r.exchange(Map::Disparity);
     Ok(())
 }

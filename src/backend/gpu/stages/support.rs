@@ -6,7 +6,7 @@ use crate::backend::gpu::commands::Recorder;
 use crate::backend::gpu::kernel::{Variant, shader};
 use crate::error::Result;
 use crate::plan::support::{SUPPORT_NEAR, SUPPORT_PLACES, SUPPORT_REACH, SUPPORT_STEP};
-use crate::stage::{Data, Map};
+use crate::stage::Map;
 
 shader! {
     "support"(plan, level) { floor: u32 }
@@ -20,6 +20,6 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let own = Uniform { floor: r.plan.method.refinement.confidence_floor };
     let width = r.params().width;
     r.rows(&main(r.plan, 0), &own, width)?;
-    r.replace(Data::Map(Map::Validity), Data::NextFlags);
+    r.exchange(Map::Validity);
     Ok(())
 }
