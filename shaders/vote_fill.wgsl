@@ -1,4 +1,4 @@
-// Votes of valid pixels for filled and doubtful ones, over half-size pixels and every second label. `show` and `halve` prepare. Then
+// Votes of valid pixels for filled and doubtful ones, over half-size pixels and every second label. `halve` and `show` prepare. Then
 // `own_votes`, `sum_rows`, `sum_columns` and `elect` run for each band of half-size rows, and finally `take`.
 
 #import band image maps
@@ -81,7 +81,7 @@ fn weighted(weight: u32, sum: u32) -> u32 {
     return (sum >> 16u) * weight + (((sum & 0xffffu) * weight) >> 16u);
 }
 
-// The labels that sure pixels show in the right view, in zeroed maps. One invocation per pixel.
+// The labels that sure pixels show in the right view, after `halve`. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn show(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -98,8 +98,8 @@ fn show(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
 }
 
-// Colours of half-size pixels, and whether their votes are needed. One invocation per half-size pixel; the
-// bound rows of the image start up to two rows above the band.
+// Colours of half-size pixels, and whether their votes are needed; nothing is shown yet. One invocation per
+// half-size pixel; the bound rows of the image start up to two rows above the band.
 @compute @workgroup_size(GROUP)
 fn halve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -123,6 +123,7 @@ fn halve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
             if may_be_outvoted(flags[at]) {
                 asked = ASKED;
             }
+            atomicStore(&shown[(v - 2u * params.band.first_row) * params.level.pixel_pitch + u], 0u);
         }
     }
     let mean = select(vec3(0u), (2u * sum + vec3(count)) / vec3(2u * max(count, 1u)), count > 0u);

@@ -64,9 +64,8 @@ impl Plan {
         // A device needs less for these, but also keeps candidates and label ranges.
         let of_level = Data::of_levels(level).into_iter().chain(Data::of_level(level));
         let graph = of_level.filter(|data| match data {
-            // The left view counts as a map, and levels share the next guide.
+            // The left view counts as a map.
             Data::Volume(_) | Data::Guide(0) => false,
-            Data::NextGuide(z) => *z == 1,
             data => data.is_there(self),
         });
         let (windows, maps): (Vec<_>, Vec<_>) =

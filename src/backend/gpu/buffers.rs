@@ -126,9 +126,13 @@ impl Buffers {
         let pools =
             (finest_shared < levels.len()).then(|| Self::pools(a, plan, finest_shared)).transpose()?;
         let mut pools = pools.unwrap_or_default();
-        // Levels share this buffer.
-        let most = (1..levels.len()).map(|z| Data::NextGuide(z).array(plan).bytes() / 4).max().unwrap_or(0);
-        let next_guide = a.buffer("next guide", most)?;
+        // Every second level shares a buffer: a next guide is computed from the one before it.
+        let next_guides = |first: usize| {
+            let levels = (first..levels.len()).step_by(2).map(|z| Data::NextGuide(z).array(plan).bytes() / 4);
+            levels.sum()
+        };
+        let mut next_guides =
+            [a.buffer("next guide", next_guides(2))?, a.buffer("next guide", next_guides(1))?].map(Pool::new);
         for z in (0..levels.len()).rev() {
             let parts = Parts::of(a.device, plan, z)?;
             let there = |data: &Data| data.is_there(plan);
@@ -146,9 +150,7 @@ impl Buffers {
             for data in Data::of_level(z).into_iter().filter(there) {
                 let array = data.array(plan);
                 let rows = match data {
-                    Data::NextGuide(_) => {
-                        Pool::new(next_guide.clone()).rows(array.words as u32, array.rows as u32)
-                    }
+                    Data::NextGuide(_) => next_guides[z % 2].rows(array.words as u32, array.rows as u32),
                     Data::FullWindows(_) => {
                         Rows::of(a.constant("full label windows", &data.constant(plan))?, array.words as u32)
                     }

@@ -18,8 +18,6 @@ use std::ops::Range;
 pub(super) enum Command {
     Dispatch(Dispatch),
     Copy(Copy),
-    /// Zeroes a range of bytes.
-    Clear(wgpu::Buffer, Range<u64>),
     /// Makes the successor of a map the map.
     Exchange(Map),
 }
@@ -210,14 +208,6 @@ impl<'a> Recorder<'a> {
         let all = written.level().filter(|z| *z != self.level).map(|z| 0..self.buffers.levels[z].height);
         let rows = all.unwrap_or_else(|| self.own_rows());
         self.copies(self.array(written).exchange(&rows));
-    }
-
-    /// Zeroes the rows of `data`, halos included.
-    pub(super) fn clear(&mut self, data: Data) {
-        let rows = self.own_rows();
-        let cleared = self.array(data).within(&rows);
-        self.commands.extend(cleared.map(|(buffer, bytes)| Command::Clear(buffer.clone(), bytes)));
-        self.renew(data);
     }
 
     /// Calls `record` at another level, for these rows of it.

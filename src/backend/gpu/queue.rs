@@ -47,7 +47,6 @@ impl Gpu {
                     let (from, to) = (&copy.from, &copy.to);
                     self.encoder()?.copy_buffer_to_buffer(&from.0, from.1, &to.0, to.1, copy.bytes);
                 }
-                Command::Clear(buffer, bytes) => self.clear(buffer, bytes)?,
                 Command::Dispatch(dispatch) => self.dispatch(dispatch)?,
                 Command::Exchange(map) => {
                     let state = self.state.as_mut().expect("a stage has a state to run on");

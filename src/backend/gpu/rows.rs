@@ -179,13 +179,6 @@ impl Rows {
         self.parts.iter().map(|p| (p.buffer.clone(), at(p, p.own.start)..at(p, p.own.end))).collect()
     }
 
-    /// The byte ranges of `rows` in each part's buffer, halo excluded.
-    pub(super) fn within(&self, rows: &Range<u32>) -> impl Iterator<Item = (&wgpu::Buffer, Range<u64>)> {
-        let parts =
-            self.parts.iter().map(move |p| (p, common(&p.own, rows))).filter(|(_, rows)| !rows.is_empty());
-        parts.map(|(p, rows)| (&p.buffer, p.at(rows.start, self.row_bytes)..p.at(rows.end, self.row_bytes)))
-    }
-
     /// Each part's buffer, and the byte range of all its rows in it.
     pub(super) fn held(&self) -> impl Iterator<Item = (&wgpu::Buffer, Range<u64>)> {
         let at = |p: &Part, row: u32| p.at(row, self.row_bytes);

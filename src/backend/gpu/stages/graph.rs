@@ -1,7 +1,7 @@
 //! The graph of a level: see [`Stage::Graph`](crate::backend::Stage::Graph).
 
 use crate::backend::gpu::commands::Recorder;
-use crate::backend::gpu::kernel::{Variant, shader};
+use crate::backend::gpu::kernel::{Kernel, Variant, shader};
 use crate::backend::gpu::rows::HALO;
 use crate::backend::gpu::uniform::LevelParams;
 use crate::error::Result;
@@ -60,7 +60,10 @@ fn variant(plan: &Plan, loops: usize) -> Variant {
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (plan, width) = (r.plan, r.params().width);
-    record_guide(r)?;
+    if r.level > 0 {
+        record_guide(r, &downsample(plan, r.level))?;
+        r.replace(Data::Guide(r.level), Data::NextGuide(r.level));
+    }
     if plan.neighbours > 0 {
         r.rows(&choose(plan, r.level), &Uniform::of(plan), width)?;
     }
@@ -69,9 +72,17 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
 
 /// Like `record`, with one dispatch for all `levels`, except for their guides.
 pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
-    for z in levels.clone() {
+    let coarser = levels.start.max(1)..levels.end;
+    for z in coarser.clone() {
         r.level = z;
-        record_guide(r)?;
+        // All copies follow the last guide, because each one ends a compute pass.
+        let kernel = downsample(r.plan, z);
+        let is_first = z == coarser.start;
+        let kernel = if is_first { kernel } else { kernel.taking("fine_guide", "fine_next_guide") };
+        record_guide(r, &kernel)?;
+    }
+    for z in coarser {
+        r.replace(Data::Guide(z), Data::NextGuide(z));
     }
     let (plan, buffers) = (r.plan, r.buffers);
     if plan.neighbours > 0 {
@@ -86,17 +97,12 @@ pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()
     Ok(())
 }
 
-/// Computes the guide of the level from the next finer one.
-fn record_guide(r: &mut Recorder) -> Result<()> {
-    if r.level == 0 {
-        return Ok(());
-    }
+/// Computes the next guide of the level from the next finer one. Guides may share a buffer, which a dispatch must
+/// not both read and write.
+fn record_guide(r: &mut Recorder, downsample: &Kernel<Uniform>) -> Result<()> {
     let (z, width) = (r.level, r.params().width);
     let own = Uniform { fine: r.buffers.levels[z - 1], ..Uniform::default() };
-    // A dispatch must not read and write one buffer.
-    r.rows(&downsample(r.plan, z), &own, width)?;
-    r.replace(Data::Guide(z), Data::NextGuide(z));
-    Ok(())
+    r.rows(downsample, &own, width)
 }
 
 /// Finds the factors that hold each pixel.

@@ -26,7 +26,7 @@ shader! {
         first_voted: u32,
     }
     show { flags, optima, shown } => variant(0);
-    halve { left around 2, flags around 2, half_colours } => variant(6 + 42).over(Extent::Half);
+    halve { left around 2, flags around 2, half_colours, shown } => variant(6 + 42).over(Extent::Half);
     own_votes { flags, disparity, shown, sums } => variant(6).over(Extent::Half);
     sum_rows { half_colours, sums, vote_weights } => variant(2 * Votes::of(plan).width).over(Extent::Half);
     sum_columns { half_colours around VOTE_REACH, sums around VOTE_REACH, totals, vote_weights } => {
@@ -66,8 +66,6 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         smaller_is_nearer: (plan.method.refinement.nearer == Nearer::Smaller).into(),
         ..Uniform::default()
     };
-    r.clear(Data::Shown);
-    r.rows(&show(plan, 0), &own, l.width)?;
     let reach = VOTE_REACH as u32;
     let [halved, counted, summed] =
         [halve(plan, 0).any(), own_votes(plan, 0).any(), sum_columns(plan, 0).any()];
@@ -76,6 +74,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         let size = (own.half_width, rows.end - rows.start);
         r.dispatch(&halve(plan, 0), &own, rows, size)?;
     }
+    r.rows(&show(plan, 0), &own, l.width)?;
     for rows in bands {
         let summed = with_halo(&rows, reach, own.half_height);
         let own = Uniform { first_summed: summed.start, ..own };
