@@ -57,7 +57,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             offset = (FRACTION * (difference + most) + slope) / most - FRACTION;
         }
     }
-    let fixed = FRACTION * (params.level.low + label) + offset;
+    // A pixel without a label takes the last one.
+    let fixed = FRACTION * (params.level.low + min(label, i32(params.level.labels) - 1)) + offset;
     raw[id.y * pitch + id.x] = fixed;
     disparity[id.y * pitch + id.x] = fixed;
 }

@@ -16,6 +16,7 @@ pub(crate) mod support;
 pub mod votes;
 
 use crate::error::Result;
+use crate::maps::FRACTION;
 use crate::options::{
     Agreement, DisparityRange, Fill, LeftRightCheck, MatchSize, MatchingCost, Method, Order, Potential,
     Pyramid,
@@ -313,6 +314,14 @@ impl Plan {
     #[must_use]
     pub fn of_pair(&self) -> FullSize {
         self.full.unwrap_or(FullSize { size: self.size(), range: self.range })
+    }
+
+    /// Whether all disparities of the maps, as 1/256 px above the lowest one, fit in 16 bits, in which a device packs them before
+    /// they are read back. The anchors of a prior may be outside the range.
+    #[must_use]
+    pub fn packs_maps(&self) -> bool {
+        let range = self.of_pair().range;
+        !self.prior && FRACTION * (range.max - range.min) <= i32::from(u16::MAX)
     }
 
     /// This plan for another size of the finest level: same range, method and number of levels.

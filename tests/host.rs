@@ -32,8 +32,8 @@ struct Limits {
     cleared: u64,
 }
 
-const FAST: Limits = Limits { dispatches: 105, passes: 2, submissions: 1, up: 8, down: 12, cleared: 24 };
-const DEFAULT: Limits = Limits { dispatches: 223, passes: 3, submissions: 2, up: 8, down: 12, cleared: 24 };
+const FAST: Limits = Limits { dispatches: 106, passes: 2, submissions: 1, up: 8, down: 6, cleared: 24 };
+const DEFAULT: Limits = Limits { dispatches: 224, passes: 3, submissions: 2, up: 8, down: 6, cleared: 24 };
 
 /// The counts of each of `rounds` pairs that overlap: each is started before the one before it is finished.
 fn counts(preset: &str, rounds: usize) -> Vec<Traffic> {

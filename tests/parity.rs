@@ -208,8 +208,8 @@ fn nothing_else_is_transferred() {
     let method = Method::default();
     matched(&mut gpu, &pair, range, &method);
     let traffic = gpu.traffic();
-    // Disparity, raw disparity and flags of 240 x 180 pixels, in rows of 256.
-    assert_eq!(traffic.bytes_down, 3 * 4 * 256 * 180, "{traffic:?}");
+    // Disparity and raw disparity in 16 bits, and flags, of 240 x 180 pixels in rows of 256.
+    assert_eq!(traffic.bytes_down, 3 * 2 * 256 * 180, "{traffic:?}");
     // With a tolerance, a few more words are read back to tell when it was reached.
     let mut tolerant = method.clone();
     (tolerant.schedule.tolerance, tolerant.schedule.final_iterations) = (0.5, 20);
@@ -222,6 +222,28 @@ fn nothing_else_is_transferred() {
     matched(&mut gpu, &pair, range, &method);
     assert_eq!(gpu.traffic().dispatches, traffic.dispatches);
     assert!(gpu.traffic().bytes_up < traffic.bytes_up);
+}
+
+/// Disparities are read back in 16 bits up to the largest range that fits, also of pixels of the right view without a label.
+#[test]
+fn packed_maps() {
+    let Some(mut gpu) = devices::gpu() else { return };
+    let (pair, _) = load(Path::new("testdata/slanted"));
+    // An odd width that almost fills rows.
+    let small = Pair::new(cut(pair.left(), 127, 17), cut(pair.right(), 127, 17)).unwrap();
+    for preset in ["default", "fast"] {
+        let mut method = Method::preset(preset).unwrap();
+        method.refinement.right_map = true;
+        let mut bytes = Vec::new();
+        for labels in [255, 256, 257] {
+            let range = DisparityRange::new(-100, labels - 101).unwrap();
+            let actual = matched(&mut gpu, &small, range, &method);
+            let expected = matched(&mut Cpu::default(), &small, range, &method);
+            assert!(differences(&actual, &expected).is_empty(), "{preset}, {labels} labels");
+            bytes.push(gpu.traffic().bytes_down);
+        }
+        assert_eq!([2 * bytes[0], 2 * bytes[1]], [bytes[2]; 2], "{preset}");
+    }
 }
 
 #[test]

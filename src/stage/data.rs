@@ -63,6 +63,14 @@ pub enum Data {
     NextDisparity,
     /// Like [`Self::NextDisparity`], for [`Map::Validity`] and [`Map::Confidence`].
     NextFlags,
+    /// The maps as they are read back: [`Map::Disparity`] above the lowest one, confidence and validity in a word.
+    PackedMaps,
+    /// [`Map::Raw`] above the lowest disparity, two pixels in a word.
+    PackedRaw,
+    /// Like [`Self::PackedMaps`], at full size.
+    FullPackedMaps,
+    /// Like [`Self::PackedRaw`], at full size.
+    FullPackedRaw,
     /// Union-find forest of the speckle filter.
     Parents,
     /// Sizes of the regions of the speckle filter.
@@ -307,6 +315,14 @@ impl Data {
             Self::Map(Map::Validity | Map::Confidence) => fine("flags", 1),
             Self::NextDisparity => fine("next_disparity", 1),
             Self::NextFlags => fine("next_flags", 1),
+            Self::PackedMaps => fine("packed_maps", 1).place(Place::In(Self::NextDisparity)),
+            Self::PackedRaw => {
+                rows("packed_raw", padded(width.div_ceil(2)), Extent::Level(0)).place(Place::In(Self::NextFlags))
+            }
+            Self::FullPackedMaps => full("full_packed_maps", 1).place(Place::In(Self::FullLeftCensus)),
+            Self::FullPackedRaw => {
+                rows("full_packed_raw", padded(width), Extent::Full).place(Place::In(Self::FullRightCensus))
+            }
             Self::Parents => fine("parents", 1).of_band(height),
             Self::Sizes => fine("sizes", 1).of_band(height),
             Self::KnownRows => Array::table("known_rows", height),
@@ -425,6 +441,8 @@ impl Data {
             Self::NextFlags,
             Self::LeftWords,
             Self::RightWords,
+            Self::PackedMaps,
+            Self::PackedRaw,
             Self::Shown,
             Self::Parents,
             Self::Sizes,
@@ -445,6 +463,8 @@ impl Data {
             Self::FullRightCensus,
             Self::FullLeftWords,
             Self::FullRightWords,
+            Self::FullPackedMaps,
+            Self::FullPackedRaw,
             Self::BlockCosts,
         ];
         maps.chain(others).collect()
@@ -479,6 +499,8 @@ impl Data {
             Self::Prior(z) => z < levels && plan.has_priors(),
             Self::Map(Map::Anchor) => plan.prior,
             Self::LeftWords | Self::RightWords => plan.full.is_none(),
+            Self::PackedMaps | Self::PackedRaw => plan.packs_maps() && plan.full.is_none(),
+            Self::FullPackedMaps | Self::FullPackedRaw => plan.packs_maps() && plan.full.is_some(),
             Self::FullLeft
             | Self::FullRight
             | Self::FullLeftWords

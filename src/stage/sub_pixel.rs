@@ -16,9 +16,9 @@
 //!    offset = clamp(floor((256 (a - c) + s) / (2 s)), -256, 256)
 //!    ```
 //!
-//!    It is 0 if s <= 0, if L is the first or last label of the level or
-//!    [`NO_LABEL`](crate::backend::NO_LABEL), and if
-//!    [`sub_pixel`](crate::options::RefinementOptions::sub_pixel) is off.
+//!    It is 0 if s <= 0, if L is the first or last label of the level, and if
+//!    [`sub_pixel`](crate::options::RefinementOptions::sub_pixel) is off. A pixel with
+//!    [`NO_LABEL`](crate::backend::NO_LABEL) counts as one with the last label, but not in the neighbourhood of others.
 //! 3. [`Raw`](crate::backend::Map::Raw) and [`Disparity`](crate::backend::Map::Disparity) become
 //!    256 (low + L) + offset.
 //!

@@ -172,7 +172,7 @@ impl Buffers {
         for data in Data::arrays_of_match(plan).into_iter().filter(|data| *data != Data::Groups) {
             let array = data.array(plan);
             let rows = match array.place {
-                Place::In(other) => arrays[&(other.array(plan).name, 0)].1.clone(),
+                Place::In(other) => arrays[&(other.array(plan).name, 0)].1.with_words(array.words as u32),
                 _ if array.start == Start::Constant => {
                     let words = data.constant(plan);
                     Rows::of(a.constant(array.name, &words)?, words.len() as u32)
@@ -260,7 +260,8 @@ impl Buffers {
             let next_name = next.array(plan).name;
             let moves = |array: &Array| array.name == next_name || array.place == Place::In(next);
             let moving = arrays.values().filter(|(array, _)| moves(array));
-            elsewhere.extend(moving.map(|(array, _)| (array.name, (at, of_map.clone()))));
+            elsewhere
+                .extend(moving.map(|(array, _)| (array.name, (at, of_map.with_words(array.words as u32)))));
         }
         elsewhere
     }

@@ -2,7 +2,7 @@
 
 use super::device::Device;
 use super::frame::{DeviceMap, Frame, OpenDevice, copy};
-use super::stages::Unpacking;
+use super::stages::{Transfer, Unpacking};
 use super::{Gpu, State, uploaded_rows, uploaded_words};
 use crate::backend::Map;
 use crate::error::{Error, Result};
@@ -67,7 +67,8 @@ impl Gpu {
                 copy(self.encoder()?, frame, (from, part), to, offset, pitch);
             }
         }
-        self.unpack(state, Unpacking { is_opaque: true, is_bgra: frames[0].is_bgra() })
+        let unpacking = Unpacking { is_opaque: true, is_bgra: frames[0].is_bgra() };
+        self.transfer(state, Transfer::Up(unpacking))
     }
 
     /// The commands that were recorded since [`Self::prepare_frames`], in order.

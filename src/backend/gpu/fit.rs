@@ -45,9 +45,9 @@ impl Gpu {
             let parts = split(run.clone()).into_iter();
             parts.flat_map(|part| part.stages().collect::<Vec<_>>()).flat_map(|stage| kernels(stage, plan))
         });
-        let of_uploads = program.frames.iter().flat_map(|frame| other_kernels(&frame.plan));
+        let of_transfers = program.frames.iter().flat_map(|frame| other_kernels(&frame.plan));
         let mut missing = HashMap::new();
-        for kernel in of_stages.chain(of_uploads) {
+        for kernel in of_stages.chain(of_transfers) {
             if kernel.loops <= MAX_LOOP_ITERATIONS && !self.pipelines.contains_key(&kernel.shader) {
                 missing.insert(kernel.shader.clone(), kernel);
             }

@@ -34,7 +34,7 @@ use super::{Backend, Map, Promise, Requests, Stage, Ticket, Traffic};
 use crate::error::{Error, Purpose, Result};
 use crate::front::Prepared;
 use crate::image::Plane;
-use crate::maps::Maps;
+use crate::maps::{FRACTION, Maps};
 use crate::memory;
 use crate::plan::{LevelPlan, Plan};
 use crate::program::schedule::split;
@@ -54,7 +54,7 @@ pub use frame::{DeviceMap, Frame, OpenDevice, wgpu};
 pub use kernel::{Bound, Kernel, MAX_LOOP_ITERATIONS};
 use recording::Recording;
 pub use shader::{Constant, Shader, binding_number};
-use stages::{Unpacking, record, record_levels, record_upload};
+use stages::{Transfer, Unpacking, record, record_levels, record_transfer};
 pub use stages::{kernels, other_kernels};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -90,8 +90,8 @@ struct State {
     commands: Commands,
     /// The messages that were sent. All others count as 0, whatever is stored.
     messages: SentMessages,
-    /// The commands that unpack the uploaded pair.
-    upload: HashMap<(Unpacking, Exchanged), Arc<[Command]>>,
+    /// The commands of each transfer.
+    transfers: HashMap<(Transfer, Exchanged), Arc<[Command]>>,
     /// Words of an image, for upload.
     words: Vec<u32>,
 }
@@ -218,11 +218,11 @@ impl Gpu {
         self.device.free_staging();
         let mut buffers = Buffers::new(&mut self.device, plan)?;
         let commands = self.commands_that_end(plan, &mut buffers)?;
-        let upload = HashMap::new();
         let (pitch, rows) = uploaded_rows(plan, &buffers);
         let words = pitch as usize * rows;
         let messages = SentMessages::none(plan.levels.len());
-        Ok(State { plan: plan.clone(), buffers, commands, messages, upload, words: vec![0; words] })
+        let transfers = HashMap::new();
+        Ok(State { plan: plan.clone(), buffers, commands, messages, transfers, words: vec![0; words] })
     }
 
     /// The state for `plan`, reused if it fits.
@@ -305,7 +305,7 @@ impl Gpu {
             array(Data::Map(Map::Anchor)).write(device, &anchor_words(&anchors, pitch))?;
         }
         if narrow {
-            self.unpack(state, Unpacking::default())?;
+            self.transfer(state, Transfer::Up(Unpacking::default()))?;
         }
         self.device.check()
     }
@@ -330,20 +330,20 @@ impl Gpu {
         Ok(())
     }
 
-    /// Unpacks the uploaded pair.
-    fn unpack(&mut self, state: &mut State, unpacking: Unpacking) -> Result<()> {
-        let State { plan, buffers, upload, .. } = state;
-        let commands = if let Some(commands) = upload.get(&(unpacking, buffers.exchanged)) {
+    fn transfer(&mut self, state: &mut State, transfer: Transfer) -> Result<()> {
+        let State { plan, buffers, transfers, .. } = state;
+        let key = (transfer, buffers.exchanged);
+        let commands = if let Some(commands) = transfers.get(&key) {
             Arc::clone(commands)
         } else {
-            let record = |recorder: &mut Recorder| record_upload(recorder, unpacking);
+            let record = |recorder: &mut Recorder| record_transfer(recorder, transfer);
             self.recorded_at(0, plan, buffers, 0.0, None, record)?
         };
-        // The upload is no run of a stage, so it is not timed.
+        // A transfer is no run of a stage, so it is not timed.
         let timer = self.timer.take();
         let recorded = self.record(&commands);
         self.timer = timer;
-        upload.insert((unpacking, buffers.exchanged), commands);
+        transfers.insert(key, commands);
         recorded
     }
 
@@ -396,11 +396,24 @@ fn plane<T>(
     Plane::new(width, height, values)
 }
 
+/// Packed disparities of a map of the shape (width, height, words per row), two in a word; `low` is the lowest, in 1/256 px.
+fn packed_plane(words: &[u32], (width, height, pitch): (usize, usize, usize), low: i32) -> Plane<i32> {
+    let mut values = Vec::with_capacity(width * height);
+    for row in words.chunks_exact(pitch) {
+        let pairs = row.iter().flat_map(|&word| [word & 0xffff, word >> 16]);
+        values.extend(pairs.take(width).map(|above| low + above.cast_signed()));
+    }
+    Plane::new(width, height, values)
+}
+
 /// Maps being read back from the device.
 struct RequestedMaps {
-    /// Disparity, raw disparity, flags; and [`Convergence`] if message passing may stop early.
+    /// The maps: two packed ones, or disparity, raw disparity and flags; and [`Convergence`] if message passing may stop early.
     parts: device::Requested,
+    /// Width, height, and words per row of the maps in whole words.
     shape: (usize, usize, usize),
+    /// If they are packed: words per row of the raw map, and the lowest disparity in 1/256 px.
+    packed: Option<(usize, i32)>,
 }
 
 impl Backend for Gpu {
@@ -481,28 +494,46 @@ impl Backend for Gpu {
     }
 
     fn request_maps(&mut self) -> Result<Ticket> {
-        let State { plan, buffers, .. } = self.state();
-        let here = [Map::Disparity, Map::Raw, Map::Validity];
-        let full = [Map::FullDisparity, Map::FullRaw, Map::FullValidity];
-        let maps = if plan.full.is_some() { full } else { here };
-        let shape = self.map_shape(maps[0]);
-        let mut parts: Vec<_> = maps.into_iter().flat_map(|map| buffers.map(plan, map).own()).collect();
-        parts.extend(self.state().plan.settled_change().map(|_| self.convergence_at()));
+        let mut state = self.state.take().expect("a match has maps");
+        let packs = state.plan.packs_maps();
+        let recorded = if packs { self.transfer(&mut state, Transfer::Down) } else { Ok(()) };
+        let State { plan, buffers, .. } = self.state.insert(state);
+        recorded?;
+        let data = match (packs, plan.full.is_some()) {
+            (true, false) => vec![Data::PackedMaps, Data::PackedRaw],
+            (true, true) => vec![Data::FullPackedMaps, Data::FullPackedRaw],
+            (false, false) => [Map::Disparity, Map::Raw, Map::Validity].map(Data::Map).to_vec(),
+            (false, true) => [Map::FullDisparity, Map::FullRaw, Map::FullValidity].map(Data::Map).to_vec(),
+        };
+        let mut parts: Vec<_> = data.iter().flat_map(|&data| buffers.rows(plan, data).own()).collect();
+        let (width, height) =
+            if plan.full.is_some() { Map::FullDisparity } else { Map::Disparity }.size(plan);
+        let shape = (width, height, data[0].array(plan).words);
+        let packed = packs.then(|| (data[1].array(plan).words, FRACTION * plan.of_pair().range.min));
+        parts.extend(plan.settled_change().map(|_| self.convergence_at()));
         let parts = self.request(&parts)?;
-        Ok(self.requests.add(RequestedMaps { parts, shape }))
+        Ok(self.requests.add(RequestedMaps { parts, shape, packed }))
     }
 
     fn maps(&mut self, ticket: Ticket) -> Promise<'_, (Maps, u32)> {
-        let RequestedMaps { parts, shape } = self.requests.take(&ticket);
+        let RequestedMaps { parts, shape, packed } = self.requests.take(&ticket);
         Box::pin(self.device.read(parts, move |words| {
+            let (disparity, raw, flags) = if let Some((pitch, low)) = packed {
+                let disparity = plane(words[0], shape, |word| low + (word >> 16).cast_signed());
+                (disparity, packed_plane(words[1], (shape.0, shape.1, pitch), low), 0)
+            } else {
+                let [disparity, raw] = [0, 1].map(|at| plane(words[at], shape, u32::cast_signed));
+                (disparity, raw, 2)
+            };
             let maps = Maps {
-                disparity: plane(words[0], shape, u32::cast_signed),
-                raw: plane(words[1], shape, u32::cast_signed),
-                confidence: plane(words[2], shape, |word| (word >> 8) as u8),
-                validity: plane(words[2], shape, |word| word as u8),
+                disparity,
+                raw,
+                confidence: plane(words[flags], shape, |word| (word >> 8) as u8),
+                validity: plane(words[flags], shape, |word| word as u8),
                 right: None,
             };
-            (maps, words.get(3).map_or(0, |words| Convergence::of(words).idle))
+            let convergence = words.get(if packed.is_some() { 2 } else { 3 });
+            (maps, convergence.map_or(0, |words| Convergence::of(words).idle))
         }))
     }
 

@@ -108,6 +108,11 @@ impl Rows {
         Self { parts: vec![part], row_bytes: 4 * u64::from(words) }
     }
 
+    /// Rows of `words` words each in the same memory.
+    pub(super) fn with_words(&self, words: u32) -> Self {
+        Self { parts: self.parts.clone(), row_bytes: 4 * u64::from(words) }
+    }
+
     /// Binds `rows` of one part, which may be in its halo.
     pub(super) fn bind(&self, rows: &Range<u32>) -> Binding {
         let within = |outer: &Range<u32>| outer.start <= rows.start && rows.end <= outer.end;

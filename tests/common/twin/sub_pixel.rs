@@ -56,7 +56,7 @@ pub fn sub_pixel_by(fit: &Fit, plan: &Plan, cost: &[u32], maps: &mut Finest) {
         exact.floor().clamp(-fit.most, fit.most) as i32
     };
     maps.raw = Plane::from_fn(level.width, level.height, |x, y| {
-        let whole = 256 * (plan.range.min + maps.label[(x, y)]);
+        let whole = 256 * (plan.range.min + maps.label[(x, y)].min(level.labels as i32 - 1));
         if plan.method.refinement.sub_pixel { whole + offset(x, y) } else { whole }
     });
     maps.disparity = maps.raw.clone();

@@ -20,6 +20,7 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     let level = &plan.levels[0];
     let MapSet { optima, raw, disparity, .. } = maps;
     let cells = BAND * level.width;
+    let last = level.labels as u16 - 1;
     let raw = raw.rows_mut(rows.clone()).par_chunks_mut(cells);
     let bands = raw.zip(disparity.rows_mut(rows.clone()).par_chunks_mut(cells));
     bands.enumerate().for_each_init(
@@ -51,6 +52,7 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
                     for (i, (raw, &Optimum { label, .. })) in raw.iter_mut().zip(optima).enumerate() {
                         let inside = label > 0 && usize::from(label) + 1 < level.labels;
                         let offset = if inside { offset(sums.map(|sum| sum[i].into())) } else { 0 };
+                        let label = label.min(last);
                         *raw = FRACTION * (plan.range.min + i32::from(label)) + offset;
                     }
                 }

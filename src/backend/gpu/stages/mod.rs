@@ -1,5 +1,6 @@
 //! The stages on a device, each in the file of its name.
 
+mod pack;
 mod upload;
 
 use super::commands::Recorder;
@@ -53,7 +54,7 @@ crate::for_every_stage!(declare);
 /// The kernels of a match by `plan` that belong to no stage.
 #[must_use]
 pub fn other_kernels(plan: &Plan) -> Vec<Kernel> {
-    upload::kernels(plan, 0)
+    [upload::kernels(plan, 0), pack::kernels(plan, 0)].concat()
 }
 
 /// Records a stage for several levels at once.
@@ -72,9 +73,21 @@ pub(super) fn record_levels(stage: Stage) -> Option<RecordLevels> {
     OVER_LEVELS.into_iter().find(|(name, _)| *name == stage.name()).map(|(_, record)| record)
 }
 
-/// Records the unpacking of the uploaded pair.
-pub(super) fn record_upload(r: &mut Recorder, unpacking: Unpacking) -> Result<()> {
-    upload::record(r, unpacking)
+/// What a match runs beside its stages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Transfer {
+    /// Unpacks the uploaded pair.
+    Up(Unpacking),
+    /// Packs the final maps for reading back.
+    Down,
+}
+
+/// Records a transfer.
+pub(super) fn record_transfer(r: &mut Recorder, transfer: Transfer) -> Result<()> {
+    match transfer {
+        Transfer::Up(unpacking) => upload::record(r, unpacking),
+        Transfer::Down => pack::record(r),
+    }
 }
 
 /// Records the transposition of the graph: the factors that hold each pixel.
