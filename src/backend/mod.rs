@@ -76,6 +76,11 @@ pub trait Backend {
         None
     }
 
+    /// Whether it halves most pairs that are matched at half their size itself.
+    fn halves_pairs(&self) -> bool {
+        false
+    }
+
     /// Frees host memory of the last match, so that the next one can be [prepared](crate::front::prepare) in
     /// its place. No stage may run before [`Self::prepare`] is called again.
     fn release(&mut self) {}

@@ -182,7 +182,11 @@ impl MatchRun {
         let plan = &program.frames[running.frame].plan;
         match step {
             Step::Condition => source.condition(original, plan, watch)?,
-            Step::Correct(known) => source.correct(original, plan, known, watch)?,
+            Step::Correct(known) => {
+                // An inspector may read the half on any thread.
+                let halves = backend.halves_pairs() && !looks_in;
+                source.correct(original, plan, known, halves, watch)?;
+            }
             Step::Know(prior) => source.know(&prior, plan, watch)?,
             Step::Double => {
                 source.double(original, watch)?;

@@ -36,15 +36,16 @@ impl Source {
         Ok(())
     }
 
-    /// Makes `known` corrections to the `original` pair.
+    /// Makes `known` corrections to the `original` pair, for a backend that `halves` pairs or does not.
     pub(super) fn correct(
         &mut self,
         original: &Pair,
         plan: &Plan,
         known: Conditioning,
+        halves: bool,
         watch: &mut Watch<'_>,
     ) -> Result<()> {
-        let pair = front::correct(original, plan, &known, watch)?;
+        let pair = front::correct(original, plan, &known, halves, watch)?;
         (self.pair, self.conditioning) = (Some(pair), known);
         Ok(())
     }
@@ -61,6 +62,7 @@ impl Source {
     pub(super) fn know(&mut self, prior: &Prior, plan: &Plan, watch: &mut Watch<'_>) -> Result<()> {
         let pair = self.pair();
         let ready = watch.host("prior", || {
+            pair.compute();
             let halved = plan.full.is_some().then(|| prior.halved());
             Ok(ReadyPrior::new(halved.as_ref().unwrap_or(prior), pair, plan.range))
         })?;

@@ -40,10 +40,11 @@ use crate::plan::Plan;
 use crate::watch::Watch;
 use conditioning::Conditioning;
 
-/// `pair` at the size at which `plan` matches it.
-fn at_size(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<Pair> {
+/// `pair` at the size at which `plan` matches it; a half is computed at once, or on first use.
+fn at_size(pair: &Pair, plan: &Plan, at_once: bool, watch: &mut Watch) -> Result<Pair> {
     memory::check(plan.halving_bytes() + 3 * plan.conditioning_bytes(), Purpose::Match)?;
-    if plan.full.is_some() { watch.host("half_size", || Ok(pair.halved())) } else { Ok(pair.clone()) }
+    let half = || Ok(if at_once { pair.halved() } else { pair.halved_on_use() });
+    if plan.full.is_some() { watch.host("half_size", half) } else { Ok(pair.clone()) }
 }
 
 /// The pair that is matched by `plan` in the place of `pair`, and what was corrected in that. Where the pair is matched at half its
@@ -52,7 +53,7 @@ fn at_size(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<Pair> {
 /// # Errors
 /// [`Error::Memory`] when the machine cannot hold it, and [`Error::Interrupted`] when the observer breaks.
 pub(crate) fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(Pair, Conditioning)> {
-    let pair = at_size(pair, plan, watch)?;
+    let pair = at_size(pair, plan, true, watch)?;
     if plan.conditioning_bytes() == 0 {
         return Ok((pair, Conditioning::default()));
     }
@@ -66,12 +67,20 @@ pub(crate) fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(
     })
 }
 
-/// Like [`condition`], with corrections that are known, for `pair` at its own size.
+/// Like [`condition`], with corrections that are known, for `pair` at its own size. If the backend `halves` pairs, the host
+/// leaves that to it where nothing is corrected.
 ///
 /// # Errors
 /// The errors of [`condition`].
-pub(crate) fn correct(pair: &Pair, plan: &Plan, known: &Conditioning, watch: &mut Watch) -> Result<Pair> {
-    let pair = at_size(pair, plan, watch)?;
+pub(crate) fn correct(
+    pair: &Pair,
+    plan: &Plan,
+    known: &Conditioning,
+    halves: bool,
+    watch: &mut Watch,
+) -> Result<Pair> {
+    let at_once = !halves || *known != Conditioning::default();
+    let pair = at_size(pair, plan, at_once, watch)?;
     if *known == Conditioning::default() {
         return Ok(pair);
     }

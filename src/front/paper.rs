@@ -12,6 +12,9 @@ use crate::watch::Watch;
 /// Prepares a match of `pair` by `plan`, which is of its size, as far as the method asks for it.
 pub(super) fn prepare(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<Prepared> {
     let method = &plan.method;
+    if method.front.corrects_illumination() || plan.limits_labels() {
+        pair.compute();
+    }
     let corrected = if method.front.corrects_illumination() {
         let both = || {
             let corrected = Pair::new(homomorphic(pair.left()), homomorphic(pair.right()))?;

@@ -1,7 +1,9 @@
 //! Pairs at half their size, which keep the full-size pair.
 
-use super::{Image, Pair, Pixel, Plane};
+use super::{Image, Orientation, Pair, Pixel, Plane, View};
+use crate::threads;
 use crate::threads::prelude::*;
+use std::sync::Arc;
 
 impl Image {
     /// Extends the image to an even number of columns and rows by repeating the last ones.
@@ -22,7 +24,7 @@ impl Image {
 
     /// Halves the size of an image of even size: a pixel is the mean of the unmasked pixels of its 2 x 2
     /// block, rounded to the nearest value, halves up, and masked if all four are.
-    fn halved(&self) -> Self {
+    pub(super) fn halved(&self) -> Self {
         let (w, h) = (self.width() / 2, self.height() / 2);
         let mut pixels = vec![[0; 4]; w * h];
         let mut masked = vec![false; w * h];
@@ -73,10 +75,32 @@ impl Pair {
     /// pixel is the mean of a block, so disparities are halved.
     #[must_use]
     pub fn halved(&self) -> Self {
+        let half = self.halved_on_use();
+        half.compute();
+        half
+    }
+
+    /// Like [`Self::halved`], with views that are computed on first use, which must not be in work that threads share.
+    pub(crate) fn halved_on_use(&self) -> Self {
         let (width, height) = self.size();
         let full = if width % 2 + height % 2 == 0 { self.clone() } else { self.map(Image::in_blocks) };
-        let half = full.map(Image::halved);
-        Self { full: Some(Box::new(full)), is_exact_half: true, ..half }
+        let [left, right] = [&full.left, &full.right].map(|view| Arc::new(View::half_of(Arc::clone(view))));
+        let own_sizes = [left.size(); 2];
+        Self {
+            left,
+            right,
+            own_sizes,
+            georeferences: [None, None],
+            orientations: [Orientation::UPRIGHT; 2],
+            doubts: full.doubts.clone(),
+            full: Some(Box::new(full)),
+            is_exact_half: true,
+        }
+    }
+
+    /// Computes views that are [halved on use](Self::halved_on_use).
+    pub(crate) fn compute(&self) {
+        threads::join(|| self.left.image(), || self.right.image());
     }
 }
 

@@ -53,7 +53,7 @@ use crate::error::{Error, Result};
 use crate::threads;
 use std::fmt;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A part of an image: its columns and rows, in pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -357,17 +357,67 @@ impl Image {
     }
 }
 
+/// An image, or the half of a larger one, which is computed on first use: a device halves most pairs itself.
+#[derive(Clone, Debug)]
+struct View {
+    image: OnceLock<Image>,
+    /// (width, height).
+    size: (usize, usize),
+    /// What the image is the half of, until it is computed.
+    larger: Option<Arc<View>>,
+}
+
+impl View {
+    /// The half of `larger`, a view of even size.
+    fn half_of(larger: Arc<View>) -> Self {
+        let (width, height) = larger.size;
+        Self { image: OnceLock::new(), size: (width / 2, height / 2), larger: Some(larger) }
+    }
+
+    /// (width, height).
+    fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    /// The image. The first call may compute it on several threads, so it must not come from work that they share.
+    fn image(&self) -> &Image {
+        let larger = || self.larger.as_ref().expect("a view is an image or the half of one");
+        self.image.get_or_init(|| larger().image().halved())
+    }
+
+    /// The image, which is no half of another one any more.
+    fn image_mut(&mut self) -> &mut Image {
+        self.image();
+        self.larger = None;
+        self.image.get_mut().expect("just computed")
+    }
+}
+
+impl From<Image> for View {
+    fn from(image: Image) -> Self {
+        Self { size: image.pixels.size(), image: image.into(), larger: None }
+    }
+}
+
+impl PartialEq for View {
+    fn eq(&self, other: &Self) -> bool {
+        self.image() == other.image()
+    }
+}
+
+impl Eq for View {}
+
 /// A rectified pair. The left image is the reference: its pixel (x, y) with disparity d appears at (x - d, y)
 /// in the right image. Clones share the images.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pair {
-    left: Arc<Image>,
-    right: Arc<Image>,
+    left: Arc<View>,
+    right: Arc<View>,
     georeferences: [Option<Georeference>; 2],
     orientations: [Orientation; 2],
     doubts: [Option<String>; 2],
     full: Option<Box<Pair>>,
-    /// Whether each pixel is the mean of a block of `full`, unchanged since [`Self::halved`].
+    /// Whether each pixel is the mean of a block of `full`, unchanged since [`Self::halved_on_use`].
     is_exact_half: bool,
     /// (width, height) of each image, without the masked extension to the size of the larger one.
     own_sizes: [(usize, usize); 2],
@@ -396,8 +446,8 @@ impl Pair {
         let own_sizes = [&left, &right].map(|image| image.pixels.size());
         Self {
             own_sizes,
-            left: Arc::new(left),
-            right: Arc::new(right),
+            left: Arc::new(left.into()),
+            right: Arc::new(right.into()),
             georeferences: [None, None],
             orientations: [Orientation::UPRIGHT; 2],
             doubts: [None, None],
@@ -447,19 +497,19 @@ impl Pair {
     /// The reference view.
     #[must_use]
     pub fn left(&self) -> &Image {
-        &self.left
+        self.left.image()
     }
 
     /// Both views, mutable; shared images are copied.
     pub(crate) fn views_mut(&mut self) -> [&mut Image; 2] {
         self.is_exact_half = false;
-        [Arc::make_mut(&mut self.left), Arc::make_mut(&mut self.right)]
+        [&mut self.left, &mut self.right].map(|view| Arc::make_mut(view).image_mut())
     }
 
     /// The other view.
     #[must_use]
     pub fn right(&self) -> &Image {
-        &self.right
+        self.right.image()
     }
 
     /// The mirrored pair: the mirrored right view takes the place of the left one, so disparities keep their
@@ -467,13 +517,13 @@ impl Pair {
     #[must_use]
     pub fn mirrored(&self) -> Self {
         let full = self.full.as_ref().map(|full| Box::new(full.mirrored()));
-        let mirrored = Self::without_georeference(self.right.mirrored(), self.left.mirrored());
+        let mirrored = Self::without_georeference(self.right().mirrored(), self.left().mirrored());
         Self { full, is_exact_half: self.is_exact_half, ..mirrored }
     }
 
     /// Applies `f` to each view; the results must have the same size.
     pub(crate) fn map(&self, f: impl Fn(&Image) -> Image + Sync) -> Self {
-        let (left, right) = threads::join(|| f(&self.left), || f(&self.right));
+        let (left, right) = threads::join(|| f(self.left()), || f(self.right()));
         Self::without_georeference(left, right).doubted_as(self)
     }
 
@@ -495,12 +545,12 @@ impl Pair {
 
     /// The same pair with another left view of the same size.
     pub(crate) fn with_left(&self, left: Image) -> Self {
-        Self { left: Arc::new(left), is_exact_half: false, ..self.clone() }
+        Self { left: Arc::new(left.into()), is_exact_half: false, ..self.clone() }
     }
 
     /// The same pair with another right view of the same size.
     pub(crate) fn with_right(&self, right: Image) -> Self {
-        Self { right: Arc::new(right), is_exact_half: false, ..self.clone() }
+        Self { right: Arc::new(right.into()), is_exact_half: false, ..self.clone() }
     }
 
     /// Both views inside `part`.
@@ -524,6 +574,6 @@ impl Pair {
     /// (width, height) of both views.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
-        self.left.pixels.size()
+        self.left.size()
     }
 }

@@ -85,6 +85,7 @@ impl Backend for Cpu {
     }
 
     fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()> {
+        prepared.pair.compute();
         match self.state.as_mut() {
             Some(State::Narrow(volumes)) if plan.fits(&volumes.plan) => volumes.reset(plan, prepared),
             Some(State::Wide(volumes)) if plan.fits(&volumes.plan) => volumes.reset(plan, prepared),

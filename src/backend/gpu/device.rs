@@ -45,6 +45,9 @@ const SUBMISSIONS: usize = if cfg!(target_arch = "wasm32") { 1 } else { 4 };
 /// Largest number of buffers that are kept for reading back: those of the maps of three pairs.
 const STAGING: usize = 12;
 
+/// Largest number of buffers that are kept for uploads: those of both views of three pairs.
+const UPLOADS: usize = 6;
+
 /// Describes the smallest unit of a dispatch in errors.
 pub(super) const ONE_ROW: &str = "one row of the image and what it depends on";
 
@@ -75,6 +78,8 @@ pub(super) struct Device {
     failure: Arc<Mutex<Option<Error>>>,
     /// Buffers for reading back that are not in use.
     staging: Vec<wgpu::Buffer>,
+    /// Buffers for uploads, oldest first, with the answer whether each is mapped again.
+    uploads: Vec<(wgpu::Buffer, oneshot::Receiver<Mapped>)>,
     pub(super) traffic: Traffic,
 }
 
@@ -169,6 +174,7 @@ impl Device {
             submitted: 0,
             failure: Arc::default(),
             staging: Vec::new(),
+            uploads: Vec::new(),
             traffic: Traffic::default(),
             open: Some((device, queue)),
         }
@@ -211,8 +217,46 @@ impl Device {
         self.buffer("staging", size, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST)
     }
 
-    /// Frees the buffers for reading back that are not in use.
+    /// A mapped buffer of `size` bytes for an upload. [`Self::keep_uploads`] keeps it for the next upload of that size.
+    pub(super) fn upload(&mut self, size: u64) -> Result<wgpu::Buffer> {
+        let is_ready = |(buffer, mapped): &mut (wgpu::Buffer, oneshot::Receiver<Mapped>)| {
+            buffer.size() == size && matches!(mapped.try_recv(), Ok(Some(Ok(()))))
+        };
+        if let Some(at) = self.uploads.iter_mut().position(is_ready) {
+            return Ok(self.uploads.remove(at).0);
+        }
+        self.traffic.buffers += 1;
+        let usage = wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC;
+        let descriptor =
+            wgpu::BufferDescriptor { label: Some("upload"), size, usage, mapped_at_creation: true };
+        let buffer = self.inner()?.create_buffer(&descriptor);
+        self.check()?;
+        Ok(buffer)
+    }
+
+    /// The memory of a mapped buffer.
+    pub(super) fn mapped(&self, buffer: &wgpu::Buffer) -> Result<wgpu::BufferViewMut> {
+        let unmapped = |e| self.check().err().unwrap_or_else(|| failed(&self.name, &e));
+        buffer.get_mapped_range_mut(..).map_err(unmapped)
+    }
+
+    /// Maps buffers for uploads again, as soon as what was submitted has read them.
+    pub(super) fn keep_uploads(&mut self, buffers: Vec<wgpu::Buffer>) {
+        for buffer in buffers {
+            let (sender, mapped) = oneshot::channel();
+            buffer.map_async(wgpu::MapMode::Write, .., move |result| {
+                // The receiver is gone if the buffer is.
+                let _ = sender.send(result);
+            });
+            self.uploads.push((buffer, mapped));
+        }
+        let surplus = self.uploads.len().saturating_sub(UPLOADS);
+        self.uploads.drain(..surplus);
+    }
+
+    /// Frees the buffers for uploads and for reading back that are not in use.
     pub(super) fn free_staging(&mut self) {
+        self.uploads.clear();
         self.staging.clear();
     }
 
@@ -397,9 +441,12 @@ struct Submission {
     is_full: bool,
 }
 
+/// The answer to a request to map a buffer.
+type Mapped = std::result::Result<(), wgpu::BufferAsyncError>;
+
 /// Buffers being read back from the device, and whether each has arrived.
 pub(super) struct Requested {
-    buffers: Vec<(wgpu::Buffer, oneshot::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>)>,
+    buffers: Vec<(wgpu::Buffer, oneshot::Receiver<Mapped>)>,
     /// Number of submissions after which they are complete.
     submitted: u64,
 }

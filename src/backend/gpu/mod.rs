@@ -92,8 +92,6 @@ struct State {
     messages: SentMessages,
     /// The commands of each transfer.
     transfers: HashMap<(Transfer, Exchanged), Arc<[Command]>>,
-    /// Words of an image, for upload.
-    words: Vec<u32>,
 }
 
 impl Gpu {
@@ -218,11 +216,9 @@ impl Gpu {
         self.device.free_staging();
         let mut buffers = Buffers::new(&mut self.device, plan)?;
         let commands = self.commands_that_end(plan, &mut buffers)?;
-        let (pitch, rows) = uploaded_rows(plan, &buffers);
-        let words = pitch as usize * rows;
         let messages = SentMessages::none(plan.levels.len());
         let transfers = HashMap::new();
-        Ok(State { plan: plan.clone(), buffers, commands, messages, transfers, words: vec![0; words] })
+        Ok(State { plan: plan.clone(), buffers, commands, messages, transfers })
     }
 
     /// The state for `plan`, reused if it fits.
@@ -265,19 +261,17 @@ impl Gpu {
     /// Uploads the pair, its label ranges and its prior.
     fn load(&mut self, state: &mut State, prepared: &Prepared) -> Result<()> {
         self.reset(state)?;
-        let State { plan, buffers, words, .. } = state;
-        let device = &mut self.device;
+        let State { plan, buffers, .. } = state;
         let (pair, pitch) = (&prepared.pair, buffers.levels[0].pixel_pitch);
         let array = |data: Data| buffers.rows(plan, data);
         let larger = pair.full().filter(|_| plan.full.is_some());
         let uploaded = larger.unwrap_or(pair);
         let mut narrow = larger.is_none() || pair.is_exact_half();
         for (image, data) in [uploaded.left(), uploaded.right()].into_iter().zip(uploaded_words(plan)) {
-            narrow = narrow && narrow_words(image, uploaded_rows(plan, buffers).0, words);
-            if narrow {
-                array(data).write(device, words)?;
-            }
+            let pitch = uploaded_rows(plan, buffers).0;
+            narrow = narrow && self.upload(array(data), |memory| narrow_words(image, pitch, memory))?;
         }
+        let device = &mut self.device;
         if !narrow {
             array(Data::LEFT).write(device, &image_words(pair.left(), pitch))?;
             array(Data::Right).write(device, &image_words(pair.right(), pitch))?;
@@ -423,6 +417,10 @@ impl Backend for Gpu {
 
     fn driver(&self) -> Option<String> {
         Some(self.device.driver.clone())
+    }
+
+    fn halves_pairs(&self) -> bool {
+        true
     }
 
     fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()> {

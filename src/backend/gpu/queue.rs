@@ -88,7 +88,7 @@ impl Gpu {
 
     /// Submits all recorded commands.
     pub(super) fn submit(&mut self) -> Result<()> {
-        let Recording { encoder, pass, work, .. } = std::mem::take(&mut self.recording);
+        let Recording { encoder, pass, work, uploads, .. } = std::mem::take(&mut self.recording);
         drop(pass);
         if let Some(mut encoder) = encoder {
             if let Some(timer) = &mut self.timer {
@@ -99,7 +99,29 @@ impl Gpu {
                 None => self.device.submit(encoder, work >= self.device.pace.work())?,
             }
         }
+        self.device.keep_uploads(uploads);
         self.device.check()
+    }
+
+    /// Records an upload to all `rows` that `fill` writes to the memory of the host. Nothing is uploaded if it returns false.
+    pub(super) fn upload(
+        &mut self,
+        rows: &Rows,
+        fill: impl FnOnce(wgpu::WriteOnly<'_, [u8]>) -> bool,
+    ) -> Result<bool> {
+        let size = rows.row_bytes() * u64::from(rows.height());
+        let buffer = self.device.upload(size)?;
+        let is_filled = fill(self.device.mapped(&buffer)?.slice(..));
+        buffer.unmap();
+        if is_filled {
+            for copy in rows.copy_from(&buffer) {
+                let (from, to) = (&copy.from, &copy.to);
+                self.encoder()?.copy_buffer_to_buffer(&from.0, from.1, &to.0, to.1, copy.bytes);
+            }
+            self.device.traffic.bytes_up += size;
+        }
+        self.recording.uploads.push(buffer);
+        Ok(is_filled)
     }
 
     /// Forgets what was recorded.

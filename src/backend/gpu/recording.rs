@@ -9,4 +9,6 @@ pub(super) struct Recording {
     /// Passes so far, and the work of their dispatches.
     pub(super) passes: usize,
     pub(super) work: u64,
+    /// Buffers of the host's memory that the commands read.
+    pub(super) uploads: Vec<wgpu::Buffer>,
 }

@@ -159,6 +159,16 @@ impl Rows {
             .collect()
     }
 
+    /// Copies of all rows from `buffer`, which holds them one after the other.
+    pub(super) fn copy_from(&self, buffer: &wgpu::Buffer) -> Vec<Copy> {
+        let copies = self.parts.iter().map(|part| Copy {
+            from: (buffer.clone(), u64::from(part.held.start) * self.row_bytes),
+            to: (part.buffer.clone(), part.offset),
+            bytes: part.held.len() as u64 * self.row_bytes,
+        });
+        copies.collect()
+    }
+
     /// Bytes of a row.
     pub(super) fn row_bytes(&self) -> u64 {
         self.row_bytes

@@ -1,18 +1,31 @@
 //! Images, label ranges and label windows as words for shaders. Rows of images are converted in parallel,
 //! since this takes a large share of the host's time.
 
-use super::uniform::LevelParams;
+use super::uniform::{ALIGN_WORDS, LevelParams};
 use crate::image::{Image, Pixel, Plane};
+use crate::plan::ROW_ALIGN;
 use crate::stage::prior::LabelPrior;
 use crate::threads::prelude::*;
+use wgpu::WriteOnly;
 
-/// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, to `words`. Returns false if that
-/// loses information: if pixels are not in whole 8-bit levels, or grey does not follow from colour.
-pub(super) fn narrow_words(image: &Image, pitch: u32, words: &mut [u32]) -> bool {
-    words
-        .par_chunks_exact_mut(pitch as usize)
-        .enumerate()
-        .all(|(y, row)| narrow_row(image.pixels.row(y), image.masked.row(y), row))
+/// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, in rows of `pitch` words to `memory`.
+/// Returns false if that loses information: if pixels are not in whole 8-bit levels, or grey does not follow from
+/// colour.
+pub(super) fn narrow_words(image: &Image, pitch: u32, memory: WriteOnly<'_, [u8]>) -> bool {
+    let (width, per_row) = (image.width(), pitch as usize / ALIGN_WORDS);
+    // Rows are whole blocks, and a block can move to another thread.
+    let blocks: Vec<WriteOnly<'_, [u8; ROW_ALIGN]>> = memory.into_chunks().0.into_iter().collect();
+    let write = |(i, block): (usize, WriteOnly<'_, [u8; ROW_ALIGN]>)| {
+        let (y, x) = (i / per_row, ALIGN_WORDS * (i % per_row));
+        let columns = x.min(width)..(x + ALIGN_WORDS).min(width);
+        let mut words = [0; ALIGN_WORDS];
+        let (pixels, masked) = (&image.pixels.row(y)[columns.clone()], &image.masked.row(y)[columns]);
+        let is_narrow = narrow_row(pixels, masked, &mut words);
+        // The memory may be slow to write in pieces.
+        block.write(bytemuck::cast(words));
+        is_narrow
+    };
+    blocks.into_par_iter().enumerate().map(write).all(|is_narrow| is_narrow)
 }
 
 #[pulp::with_simd(narrow_row = crate::vectors::widest())]
