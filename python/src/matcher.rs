@@ -1,16 +1,19 @@
 //! The matcher.
 
+use std::process;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 
 use mrfgs::image::Rect;
-use mrfgs::options::DisparityRange;
+use mrfgs::options::{DeviceChoice, DisparityRange, Execution};
 use mrfgs::region::Region;
 use mrfgs::{AutoRange, Matched, Matcher, Pair, SharedMatcher, check};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyDict;
 
 use crate::arrays::{self, Image};
 use crate::exceptions::{self, exception};
@@ -29,19 +32,45 @@ use crate::{options, range};
 ///
 /// Threads may share a Matcher; their matches take turns. A forked process may use its parent's Matcher on the CPU, but not devices: there
 /// "auto" uses the CPU, as Matched.note says, and "gpu" raises RuntimeError; start processes with "spawn" or "forkserver" instead.
+///
+/// A Matcher can be pickled, and so sent to workers. It opens the device where it arrives: one for each process, however often it comes.
 #[pyclass(name = "Matcher", frozen, module = "mrfgs")]
-pub(crate) struct PyMatcher(Shared);
+pub(crate) struct PyMatcher {
+    shared: Shared,
+    /// Opens it again in another process.
+    recipe: Recipe,
+}
+
+/// The arguments of a Matcher: its device as a text, and its threads.
+type Recipe = (String, Option<usize>);
+
+/// The Matchers that have arrived by pickle: a dict from the process and the recipe.
+static ARRIVED: PyOnceLock<Py<PyDict>> = PyOnceLock::new();
 
 #[pymethods]
 impl PyMatcher {
     #[new]
     #[pyo3(signature = (*, device=None, threads=None))]
     fn new(py: Python, device: Option<&Bound<PyAny>>, threads: Option<&Bound<PyAny>>) -> PyResult<Self> {
-        let builder = Matcher::builder().execution(options::execution(device, threads)?);
-        let matcher = py.detach(|| SharedMatcher::new(builder)).map_err(exception)?;
-        // Opening a device takes a while.
-        py.check_signals()?;
-        Ok(Self(Shared { matcher: Arc::new(matcher), taken: Arc::new(AtomicU32::new(0)) }))
+        Self::open(py, options::execution(device, threads)?)
+    }
+
+    /// Supports `pickle`.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Recipe)> {
+        Ok((py.get_type::<Self>().getattr("_arrived")?, self.recipe.clone()))
+    }
+
+    #[staticmethod]
+    fn _arrived<'py>(py: Python<'py>, device: String, threads: Option<usize>) -> PyResult<Bound<'py, PyAny>> {
+        let arrived = ARRIVED.get_or_init(py, || PyDict::new(py).unbind()).bind(py);
+        let key = (process::id(), device.clone(), threads);
+        if let Some(known) = arrived.get_item(&key)? {
+            return Ok(known);
+        }
+        let execution = Execution { device: (&*device).into(), threads, ..Execution::default() };
+        let opened = Bound::new(py, Self::open(py, execution)?)?;
+        // Another thread may have been faster.
+        arrived.call_method1("setdefault", (key, opened))
     }
 
     /// Matches a rectified pair, and returns its maps as a Matched.
@@ -101,14 +130,14 @@ impl PyMatcher {
         memory: Option<&Bound<PyAny>>,
         warn: bool,
     ) -> PyResult<PyMatched> {
-        self.0.check()?;
+        self.shared.check()?;
         let method = options::method(method, options, memory)?;
         let [left, right] = Image::both(left, right)?;
         let pair = arrays::pair(&left, &right, mask, no_data)?;
         let min_disparity = range::pixels("min_disparity", min_disparity)?;
         let given = range::given(range::pixels("max_disparity", max_disparity)?, min_disparity)?;
         let prior = crate::prior::prior(pair.size(), prior, prior_sigma, prior_kind)?;
-        let matcher = &self.0.matcher;
+        let matcher = &self.shared.matcher;
         let range = range::searched(py, matcher, &pair, given, min_disparity)?;
         let part = roi.map(|roi| region(roi, &pair, range)).transpose()?;
         if warn {
@@ -176,7 +205,25 @@ impl PyMatcher {
             PyTypeError::new_err("pairs: give an iterable of pairs of arrays, such as zip(lefts, rights)")
         })?;
         let settings = Settings { method, range, min_disparity, no_data, warn };
-        Ok(PyMatchedSequence::new(self.0.clone(), settings, pairs))
+        Ok(PyMatchedSequence::new(self.shared.clone(), settings, pairs))
+    }
+}
+
+impl PyMatcher {
+    fn open(py: Python, execution: Execution) -> PyResult<Self> {
+        let device = match &execution.device {
+            DeviceChoice::Auto => "auto",
+            DeviceChoice::Cpu => "cpu",
+            DeviceChoice::Gpu => "gpu",
+            DeviceChoice::Named(name) => name,
+        };
+        let recipe = (device.to_owned(), execution.threads);
+        let builder = Matcher::builder().execution(execution);
+        let matcher = py.detach(|| SharedMatcher::new(builder)).map_err(exception)?;
+        // Opening a device takes a while.
+        py.check_signals()?;
+        let shared = Shared { matcher: Arc::new(matcher), taken: Arc::new(AtomicU32::new(0)) };
+        Ok(Self { shared, recipe })
     }
 }
 

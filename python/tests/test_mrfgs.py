@@ -389,6 +389,18 @@ class Match(unittest.TestCase):
             with self.assertRaises(mrfgs.MatchWarning):
                 mrfgs.Matcher(device="cpu").match(right, left, 15)
 
+    def test_a_matcher_opens_where_it_arrives(self):
+        matcher = mrfgs.Matcher(device="cpu", threads=1)
+        again = pickle.loads(pickle.dumps(matcher))
+        self.assertIsNot(again, matcher)
+        self.assertIs(pickle.loads(pickle.dumps(again)), again, "one for each process")
+        self.assertIs(pickle.loads(pickle.dumps(matcher)), again)
+        self.assertIsNot(pickle.loads(pickle.dumps(mrfgs.Matcher(device="cpu"))), again, "other threads")
+        here = matcher.match(*pair(), 15)
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            for there in pool.starmap(matcher.match, [(*pair(), 15)] * 2):
+                self.assertTrue(np.array_equal(there.disparity, here.disparity))
+
     def test_results_pickle_and_copy(self):
         matched = mrfgs.match(*pair(), 15, device="cpu")
         for other in (pickle.loads(pickle.dumps(matched)), copy.copy(matched), copy.deepcopy(matched)):

@@ -40,6 +40,12 @@ export async function header(file: Blob): Promise<Header | undefined> {
     return undefined;
 }
 
+/** Whether a file is an HEIC photo, as iPhones take them. */
+export async function isHeif(file: Blob): Promise<boolean> {
+    const text = new TextDecoder('latin1').decode(await file.slice(0, 12).arrayBuffer());
+    return /^.{4}ftyp(hei[cmsx]|hev[cmsx]|mif1|msf1)$/s.test(text);
+}
+
 /** The size in the first frame header. */
 function jpeg(view: DataView): Header['size'] {
     let at = 2;

@@ -1,9 +1,10 @@
 // The slots of the two views and their sources: drop, paste, file dialog, rendered scene.
 
-import { type Cut, cut, decoded, guess, views } from './decode';
+import { type Halves, both } from './both';
+import { cut, decoded, guess, views } from './decode';
 import { by, count, make, say, words } from './dom';
 import { type Named, dropped, named } from './dropped';
-import { type Header, header } from './header';
+import { type Header, header, isHeif } from './header';
 import { inOrder, ordered } from './order';
 import type { Picture, Text } from './protocol';
 import { Turns } from './turns';
@@ -52,6 +53,17 @@ interface Source {
     wish?: Wish;
 }
 
+/** What was done to an image with both views. */
+function cutting(parts: Halves | [Blob, Blob]): string {
+    if (Array.isArray(parts)) {
+        return 'The file holds both views.';
+    }
+    if (!parts.leftFirst) {
+        return `Cut into its halves. The file has the right view ${parts.how === 'beside' ? 'on the left' : 'above the left one'}.`;
+    }
+    return parts.how === 'beside' ? 'Cut into its left and right half.' : 'Cut into its upper half, as the left view, and its lower half.';
+}
+
 const other = (side: Side): Side => (side === 'left' ? 'right' : 'left');
 const listed = (files: { name: string }[]): string => files.map(({ name }) => name).join(', ');
 const keeping = (files: Text[]): string => `${listed(files)} is kept for your pair.`;
@@ -98,7 +110,7 @@ export class Slots {
         }
         by('swap').addEventListener('click', () => void this.swap());
         for (const how of ['beside', 'above'] as const) {
-            by(`cut-${how}`).addEventListener('click', () => void this.inTurn(() => this.cut(this.whole(this.views), how)));
+            by(`cut-${how}`).addEventListener('click', () => void this.inTurn(() => this.cut(this.whole(this.views), { how, leftFirst: true })));
         }
         by('scenes').append(...scenes.map((scene) => this.button(scene)));
         this.listen();
@@ -166,11 +178,13 @@ export class Slots {
         const before = this.scene === undefined ? this.views : {};
         const pair = before.left !== undefined && before.right !== undefined;
         const views = this.joined(before, view, side);
-        const how = this.whole(views, view) && (await guess(view.file));
+        const said = await both(view.file, view.name);
+        const how = said ? undefined : this.whole(views, view) && (await guess(view.file));
+        const parts = said ?? (how && { how, leftFirst: true });
         let problem: string | undefined;
-        if (how) {
+        if (parts) {
             try {
-                await this.cut(view, how, calibration);
+                await this.cut(view, parts, calibration);
                 return;
             } catch (error) {
                 problem = words(error);
@@ -269,23 +283,25 @@ export class Slots {
         return sizes.length === 2 && sizes[0] === sizes[1] ? undefined : last;
     }
 
-    /** Splits an image into both views. */
-    private async cut(one: View | undefined, how: Cut, calibration: Text[] = []): Promise<void> {
+    /** Splits an image into both views, or takes the two that its file holds. */
+    private async cut(one: View | undefined, parts: Halves | [Blob, Blob], calibration: Text[] = []): Promise<void> {
         if (!one) {
             return;
         }
         try {
             const name = one.name.replace(/\.[^.]*$/, '');
-            const files = await cut(one.file, how);
+            const files = Array.isArray(parts) ? parts : await cut(one.file, parts.how);
+            const [first, second] = Array.isArray(parts) || parts.leftFirst ? files : [files[1], files[0]];
+            const end = Array.isArray(parts) ? 'jpg' : 'png';
             const [left, right] = await Promise.all([
-                this.read({ file: files[0], name: `${name} left.png` }),
-                this.read({ file: files[1], name: `${name} right.png` }),
+                this.read({ file: first, name: `${name} left.${end}` }),
+                this.read({ file: second, name: `${name} right.${end}` }),
             ]);
             this.put({ left, right }, { name }, calibration);
         } catch (error) {
             throw new Error(`${one.name} cannot be cut: ${words(error)}`);
         }
-        say('pair-note', how === 'beside' ? 'Cut into its left and right half.' : 'Cut into its upper half, as the left view, and its lower half.');
+        say('pair-note', cutting(parts));
     }
 
     /** Reports a problem at the slot of a view. */
@@ -319,7 +335,11 @@ export class Slots {
         const read = known ? file : await decoded(file);
         const found = known ?? (read && (await header(read)));
         if (!read || !found) {
-            throw new Error(`${name} is not an image that this browser reads: take ${READS}.`);
+            throw new Error(
+                (await isHeif(file))
+                    ? `${name} is a HEIC photo, which this browser does not read. Share or save it as JPEG: on an iPhone, choose Settings, Camera, Formats, Most Compatible.`
+                    : `${name} is not an image that this browser reads: take ${READS}.`,
+            );
         }
         return { file: read, name, header: found, thumb: make('canvas', { hidden: true }), placed, calibration: [] };
     }

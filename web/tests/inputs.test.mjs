@@ -116,10 +116,13 @@ describe('inputs', () => {
         const [left, right] = [LEFT, RIGHT].map((path, i) => ({ name: `view ${i}.png`, path }));
         writeFileSync(at('notes'), 'These are no pixels.');
         const notes = { name: 'notes', path: at('notes') };
+        writeFileSync(at('photo'), Buffer.concat([Buffer.from([0, 0, 0, 24]), Buffer.from('ftypheic\0\0\0\0mif1heic', 'latin1')]));
+        const photo = { name: 'IMG_1.HEIC', path: at('photo') };
         const refused = [
             ['dropped', [left, right, { ...right, name: 'third.png' }], /3 files/],
             ['pasted', [left, right, { ...right, name: 'third.png' }], /3 files/],
             ['dropped', [notes], /notes is not an image/],
+            ['dropped', [photo], /IMG_1\.HEIC is a HEIC photo.*JPEG/],
             ['pasted', [notes], /notes is not an image/],
             ['dropped', [left, notes], /notes is not an image/],
             ['dropped', [{ ...notes, name: 'README.txt' }], /no view and no calibration in README\.txt/],

@@ -34,6 +34,35 @@ function joined(beside) {
     return PNG.sync.write(both);
 }
 
+/** Inserts a segment into a JPEG. */
+function told(jpeg, marker, body) {
+    const head = Buffer.from([0xff, marker, 0, 0]);
+    head.writeUInt16BE(body.length + 2, 2);
+    return Buffer.concat([jpeg.subarray(0, 2), head, body, jpeg.subarray(2)]);
+}
+
+/** An MPO file of two JPEG images, with its list of images in the byte order of Intel. */
+function mpo(left, right) {
+    const list = Buffer.alloc(4 + 8 + 2 + 12 + 4 + 2 * 16);
+    list.write('MPF\0II*\0', 'latin1');
+    list.writeUInt32LE(8, 8);
+    list.writeUInt16LE(1, 12);
+    list.writeUInt16LE(0xb002, 14);
+    list.writeUInt16LE(7, 16);
+    list.writeUInt32LE(2 * 16, 18);
+    list.writeUInt32LE(26, 22);
+    const first = told(left, 0xe2, list);
+    // After the start of the file, the marker and the length of the segment, and its signature.
+    const origin = 2 + 4 + 4;
+    const at = 6 + list.indexOf('MPF\0') + 4 + 26;
+    first.writeUInt32LE(0x20002, at);
+    first.writeUInt32LE(first.length, at + 4);
+    first.writeUInt32LE(0x20002, at + 16);
+    first.writeUInt32LE(right.length, at + 20);
+    first.writeUInt32LE(first.length - origin, at + 24);
+    return Buffer.concat([first, right]);
+}
+
 describe('photos', () => {
     let visit;
     let folder;
@@ -124,6 +153,48 @@ describe('photos', () => {
         await visit.says('#pair-note', /left and right half/);
         assert.equal(difference(await matches(), expected.pfm), undefined);
         assert.equal((await visit.save('pfm')).name, 'both-disparity.pfm');
+    });
+
+    it('takes both views of a 3-D camera: MPO', async () => {
+        const [left, right] = await Promise.all(VIEWS.map((path) => recoded(path, 'image/jpeg')));
+        writeFileSync(at('camera.mpo'), mpo(left, right));
+        [left, right].forEach((view, i) => writeFileSync(at(`mpo${i}.jpg`), view));
+        assert.equal(await visit.changed(() => visit.choose('left', at('camera.mpo'))), 'ready');
+        await visit.says('#pair-note', /holds both views/);
+        assert.deepEqual(await visit.names(), ['camera left.jpg', 'camera right.jpg']);
+        const map = await matches();
+        assert.equal(difference(map, native(at('mpo0.jpg'), at('mpo1.jpg'), flags).pfm), undefined);
+        assert.equal(difference(map, native(at('camera.mpo'), '', flags).pfm), undefined, 'as the program reads the file');
+        // Without the second image, the file counts as one view.
+        writeFileSync(at('cut.mpo'), mpo(left, right).subarray(0, left.length + 100));
+        assert.equal(await visit.changed(() => visit.choose('left', at('cut.mpo'))), 'empty');
+    });
+
+    it('takes both views of a 3-D camera: JPS, with the right view on the left unless it says otherwise', async () => {
+        const whole = (beside) => {
+            writeFileSync(at('whole.png'), joined(beside));
+            return recoded(at('whole.png'), 'image/jpeg');
+        };
+        const said = (layout, flags) => Buffer.concat([Buffer.from('_JPSJPS_', 'latin1'), Buffer.from([0, 4, 0, flags, layout, 1])]);
+        const beside = await whole(true);
+        const files = [
+            ['plain.jps', beside, /right view on the left/],
+            ['left first.jps', told(beside, 0xe3, said(2, 4)), /left and right half/],
+            ['above.jps', told(await whole(false), 0xe3, said(3, 4)), /upper half/],
+        ];
+        for (const [name, bytes, note] of files) {
+            writeFileSync(at(name), bytes);
+            assert.equal(await visit.changed(() => visit.choose('left', at(name))), 'ready', name);
+            await visit.says('#pair-note', note);
+            await visit.match({ preset: 'fast', device: 'cpu', range: name === 'plain.jps' ? [-47, 0] : RANGE });
+            const range = name === 'plain.jps' ? ['--method', 'fast', '--min-disparity=-47', '--max-disparity', '0'] : flags;
+            const there = disparities(native(at(name), '', range).pfm);
+            const here = disparities((await visit.save('pfm')).bytes);
+            assert.deepEqual([here.width, here.height], [there.width, there.height]);
+            const places = Array.from({ length: here.width * here.height }, (_, i) => [i % here.width, Math.floor(i / here.width)]);
+            const near = places.filter((place) => Math.abs(here.at(...place) - there.at(...place)) < 1).length;
+            assert.ok(near > 0.98 * places.length, `${name}: ${near} of ${places.length} pixels as by the program`);
+        }
     });
 
     it('cuts one with a view above the other, by guess and by button', async () => {

@@ -45,8 +45,8 @@ const SUBMISSIONS: usize = if cfg!(target_arch = "wasm32") { 1 } else { 4 };
 /// Largest number of buffers that are kept for reading back: those of the maps of three pairs.
 const STAGING: usize = 12;
 
-/// Largest number of buffers that are kept for uploads: those of both views of three pairs.
-const UPLOADS: usize = 6;
+/// Largest number of buffers that are kept for uploads: those of both views of the pair that is matched, and of the next one.
+const UPLOADS: usize = 4;
 
 /// Describes the smallest unit of a dispatch in errors.
 pub(super) const ONE_ROW: &str = "one row of the image and what it depends on";

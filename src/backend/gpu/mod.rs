@@ -324,6 +324,7 @@ impl Gpu {
         Ok(())
     }
 
+    /// Records a transfer between the arrays of stages and those that the host reads and writes.
     fn transfer(&mut self, state: &mut State, transfer: Transfer) -> Result<()> {
         let State { plan, buffers, transfers, .. } = state;
         let key = (transfer, buffers.exchanged);

@@ -108,7 +108,7 @@ impl Rows {
         Self { parts: vec![part], row_bytes: 4 * u64::from(words) }
     }
 
-    /// Rows of `words` words each in the same memory.
+    /// Rows of `words` words each, at most as many as here, in the same memory, which is in one part.
     pub(super) fn with_words(&self, words: u32) -> Self {
         Self { parts: self.parts.clone(), row_bytes: 4 * u64::from(words) }
     }
