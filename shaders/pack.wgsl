@@ -26,9 +26,9 @@ struct Params {
 // Packs two pixels of a row. Rows of an odd width have room for another pixel.
 fn pack(row: u32, pair: u32) {
     let at = row * params.pitch + 2u * pair;
-    packed_maps[at] = above(disparity[at]) << 16u | flags[at];
-    packed_maps[at + 1u] = above(disparity[at + 1u]) << 16u | flags[at + 1u];
-    packed_raw[row * params.raw_pitch + pair] = above(raw[at]) | above(raw[at + 1u]) << 16u;
+    packed_maps[at] = (above(disparity[at]) << 16u) | flags[at];
+    packed_maps[at + 1u] = (above(disparity[at + 1u]) << 16u) | flags[at + 1u];
+    packed_raw[row * params.raw_pitch + pair] = above(raw[at]) | (above(raw[at + 1u]) << 16u);
 }
 
 fn above(disparity: i32) -> u32 {

@@ -164,7 +164,7 @@ describe('photos', () => {
         assert.deepEqual(await visit.names(), ['camera left.jpg', 'camera right.jpg']);
         const map = await matches();
         assert.equal(difference(map, native(at('mpo0.jpg'), at('mpo1.jpg'), flags).pfm), undefined);
-        assert.equal(difference(map, native(at('camera.mpo'), '', flags).pfm), undefined, 'as the program reads the file');
+        assert.equal(difference(map, native(at('camera.mpo'), undefined, flags).pfm), undefined, 'as the program reads the file');
         // Without the second image, the file counts as one view.
         writeFileSync(at('cut.mpo'), mpo(left, right).subarray(0, left.length + 100));
         assert.equal(await visit.changed(() => visit.choose('left', at('cut.mpo'))), 'empty');
@@ -188,7 +188,7 @@ describe('photos', () => {
             await visit.says('#pair-note', note);
             await visit.match({ preset: 'fast', device: 'cpu', range: name === 'plain.jps' ? [-47, 0] : RANGE });
             const range = name === 'plain.jps' ? ['--method', 'fast', '--min-disparity=-47', '--max-disparity', '0'] : flags;
-            const there = disparities(native(at(name), '', range).pfm);
+            const there = disparities(native(at(name), undefined, range).pfm);
             const here = disparities((await visit.save('pfm')).bytes);
             assert.deepEqual([here.width, here.height], [there.width, there.height]);
             const places = Array.from({ length: here.width * here.height }, (_, i) => [i % here.width, Math.floor(i / here.width)]);

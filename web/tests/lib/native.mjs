@@ -8,13 +8,13 @@ import { ROOT } from './paths.mjs';
 /** The program; the variable MRFGS names another build. */
 const PROGRAM = process.env.MRFGS ?? join(ROOT, 'target/release/mrfgs');
 
-/** Runs `mrfgs match` on the CPU, and returns the bytes of the map and of the outputs in `also`. */
+/** Runs `mrfgs match` on the CPU, without `right` if the file `left` holds both views, and returns the bytes of the map and of the outputs in `also`. */
 export function native(left, right, flags = [], also = ['raw', 'confidence', 'validity']) {
     const folder = mkdtempSync(join(tmpdir(), 'mrfgs-'));
     try {
         const json = join(folder, 'run.json');
         const output = ['--also', also.join(','), '--json', json, '--device', 'cpu', '--quiet'];
-        execFileSync(PROGRAM, ['match', left, right, join(folder, 'd.pfm'), ...output, ...flags]);
+        execFileSync(PROGRAM, ['match', ...[left, right].filter(Boolean), join(folder, 'd.pfm'), ...output, ...flags]);
         const ends = { raw: 'raw.pfm', confidence: 'confidence.png', validity: 'validity.png', points: 'points.ply' };
         const files = also.map((word) => [word, readFileSync(join(folder, `d.${ends[word]}`))]);
         const { range } = JSON.parse(readFileSync(json, 'utf8'));
