@@ -25,6 +25,7 @@ const NOT_RUN: &[(&str, &str)] = &[
         "matched = mrfgs.match(left, right, 63, prior=points)                    # shape (n, 3) or (n, 4)",
         "Python; its tests try it",
     ),
+    ("matcher = mrfgs.Matcher(device=\"cpu\", threads=1)", "Python; its tests try it"),
     // These need other programs.
     (
         "ffmpeg -i stereo.mkv -pix_fmt yuv444p -f yuv4mpegpipe - | mrfgs sequence - - --method fast --max-disparity 63 | ffplay -",
