@@ -105,5 +105,7 @@ mod tests {
         assert!(filled(usize::MAX / 8, 0_u64).is_err());
         assert_eq!(filled(3, 7).unwrap(), [7; 3]);
         check(1 << 20, Purpose::Match).unwrap();
+        // The reading behind that grant does not grant more than there is.
+        assert!(check(1 << 55, Purpose::Match).is_err());
     }
 }

@@ -76,7 +76,7 @@ pub trait Backend {
         None
     }
 
-    /// Whether it halves most pairs that are matched at half their size itself.
+    /// Whether it takes pairs at full size and halves them itself, if they have 8 bits per channel and are matched at half size.
     fn halves_pairs(&self) -> bool {
         false
     }

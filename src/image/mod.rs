@@ -363,7 +363,7 @@ struct View {
     image: OnceLock<Image>,
     /// (width, height).
     size: (usize, usize),
-    /// What the image is the half of, until it is computed.
+    /// The view at twice the size that `image` is computed from on first use; `None` for an image that was given or changed.
     larger: Option<Arc<View>>,
 }
 

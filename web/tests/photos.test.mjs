@@ -14,14 +14,18 @@ const { PNG } = createRequire(join(ROOT, 'web/package.json'))('pngjs');
 const VIEWS = ['im0.png', 'im1.png'].map((file) => join(scene('mixed'), file));
 const RANGE = [0, 47];
 
+/** Inserts a segment into a JPEG. */
+function told(jpeg, marker, body) {
+    const head = Buffer.from([0xff, marker, 0, 0]);
+    head.writeUInt16BE(body.length + 2, 2);
+    return Buffer.concat([jpeg.subarray(0, 2), head, body, jpeg.subarray(2)]);
+}
+
 /** Adds the EXIF tag Orientation to a JPEG. */
 function turned(jpeg, orientation) {
     const tiff = Buffer.from('4d4d002a00000008000101120003000000010000000000000000', 'hex');
     tiff.writeUInt16BE(orientation, 18);
-    const body = Buffer.concat([Buffer.from('Exif\0\0', 'latin1'), tiff]);
-    const head = Buffer.from([0xff, 0xe1, 0, 0]);
-    head.writeUInt16BE(body.length + 2, 2);
-    return Buffer.concat([jpeg.subarray(0, 2), head, body, jpeg.subarray(2)]);
+    return told(jpeg, 0xe1, Buffer.concat([Buffer.from('Exif\0\0', 'latin1'), tiff]));
 }
 
 /** Both views in one image, the first one on the left or on top. */
@@ -32,13 +36,6 @@ function joined(beside, views = VIEWS) {
     PNG.bitblt(left, both, 0, 0, width, height, 0, 0);
     PNG.bitblt(right, both, 0, 0, width, height, beside ? width : 0, beside ? 0 : height);
     return PNG.sync.write(both);
-}
-
-/** Inserts a segment into a JPEG. */
-function told(jpeg, marker, body) {
-    const head = Buffer.from([0xff, marker, 0, 0]);
-    head.writeUInt16BE(body.length + 2, 2);
-    return Buffer.concat([jpeg.subarray(0, 2), head, body, jpeg.subarray(2)]);
 }
 
 /** An MPO file of two JPEG images, with its list of images in the byte order of Intel. */

@@ -21,7 +21,7 @@ const SUCCESSORS: [(Map, Data); 2] =
 pub(super) struct Exchanged([bool; SUCCESSORS.len()]);
 
 impl Exchanged {
-    /// Makes the successor of `map` the map.
+    /// The successor of `map` takes its place, and `map` that of the successor.
     pub(super) fn exchange(&mut self, map: Map) {
         let at = SUCCESSORS.iter().position(|(of, _)| *of == map).expect("the map has a successor");
         self.0[at] ^= true;
@@ -38,7 +38,7 @@ pub(super) struct Buffers {
     arrays: HashMap<(&'static str, usize), (Array, Rows)>,
     /// The maps that are in the memory of their successors now.
     pub(super) exchanged: Exchanged,
-    /// The rows of each array that moves with an exchange while it is elsewhere, and the index of the exchange.
+    /// For each array that an exchange moves: the index of the exchange in [`SUCCESSORS`], and its rows after it.
     elsewhere: HashMap<&'static str, (usize, Rows)>,
     /// Bound in place of missing arrays, because WGSL bindings cannot be absent.
     nothing: wgpu::Buffer,
@@ -247,7 +247,8 @@ impl Buffers {
         pools.collect()
     }
 
-    /// The rows of maps in the memory of their successors, and of all that is in it in the memory of the maps.
+    /// See [`Self::elsewhere`]: maps move into the memory of their successors, and successors, with what is placed in them, into
+    /// the memory of the maps.
     fn elsewhere(
         plan: &Plan,
         arrays: &HashMap<(&'static str, usize), (Array, Rows)>,

@@ -18,7 +18,7 @@ use std::ops::Range;
 pub(super) enum Command {
     Dispatch(Dispatch),
     Copy(Copy),
-    /// Makes the successor of a map the map.
+    /// A map and its successor change places.
     Exchange(Map),
 }
 
@@ -187,7 +187,7 @@ impl<'a> Recorder<'a> {
         self.commands
     }
 
-    /// Makes the successor of `map`, which is complete, the map.
+    /// Puts the finished successor of `map` in its place.
     pub(super) fn exchange(&mut self, map: Map) {
         self.exchanged.exchange(map);
         self.commands.push(Command::Exchange(map));

@@ -73,7 +73,7 @@ pub(super) fn record_levels(stage: Stage) -> Option<RecordLevels> {
     OVER_LEVELS.into_iter().find(|(name, _)| *name == stage.name()).map(|(_, record)| record)
 }
 
-/// What a match runs beside its stages.
+/// The work of a device before and after the stages of a match, on the way of images to it and of maps from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Transfer {
     /// Unpacks the uploaded pair.
