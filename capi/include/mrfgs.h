@@ -132,6 +132,14 @@ typedef struct mrfgs_steady mrfgs_steady;
 // A camera besides the pair, such as a colour camera: its lens, image size and pose relative to the left camera.
 typedef struct mrfgs_third_camera mrfgs_third_camera;
 
+// A region of the left image, in pixels: first column, first row and size.
+typedef struct mrfgs_region {
+  uint32_t x;
+  uint32_t y;
+  uint32_t width;
+  uint32_t height;
+} mrfgs_region;
+
 // An image in memory.
 typedef struct mrfgs_image {
   // The first pixel of the first row.
@@ -190,14 +198,6 @@ typedef struct mrfgs_maps {
   size_t sigma_stride;
 } mrfgs_maps;
 
-// A region of the left image, in pixels: first column, first row and size.
-typedef struct mrfgs_region {
-  uint32_t x;
-  uint32_t y;
-  uint32_t width;
-  uint32_t height;
-} mrfgs_region;
-
 // The destination of a rectified view, of the size mrfgs_rectification_size(). Strides are in bytes, from one row to the next.
 typedef struct mrfgs_view {
   // sizeof(mrfgs_view).
@@ -234,14 +234,14 @@ enum mrfgs_status mrfgs_calibration_of_texts(const char *const *texts,
 enum mrfgs_status mrfgs_calibration_unit(struct mrfgs_calibration *calibration, const char *unit);
 
 // Crops the calibration, for images that show only a part of the calibrated ones, possibly scaled. Both cameras get the same crop.
-enum mrfgs_status mrfgs_calibration_crop(struct mrfgs_calibration *calibration, const struct mrfgs_region *part);
+enum mrfgs_status mrfgs_calibration_crop(struct mrfgs_calibration *calibration,
+                                         const struct mrfgs_region *part);
 
 // Frees a calibration; null is allowed.
 void mrfgs_calibration_free(struct mrfgs_calibration *calibration);
 
 // Starts tracking a rig with this rectification, before any turn. The rectification may be freed earlier.
-enum mrfgs_status mrfgs_drift_new(const struct mrfgs_rectification *rectification,
-                                  struct mrfgs_drift **drift);
+enum mrfgs_status mrfgs_drift_new(const struct mrfgs_rectification *rectification, struct mrfgs_drift **drift);
 
 // Takes the next frame, rectified by the last result of mrfgs_drift_correct(), or before that by the rectification of the calibration. It
 // evaluates the first, fourth and sixteenth frame, then every 64th, and uses the last 16 of these. The masks belong to the views, as for
@@ -265,8 +265,7 @@ enum mrfgs_status mrfgs_drift_correct(const struct mrfgs_drift *drift,
 void mrfgs_drift_free(struct mrfgs_drift *drift);
 
 // Opens the device, and makes *matcher; options may be null, and may be freed afterwards. On failure *matcher is null.
-enum mrfgs_status mrfgs_matcher_new(const struct mrfgs_options *options,
-                                    struct mrfgs_matcher **matcher);
+enum mrfgs_status mrfgs_matcher_new(const struct mrfgs_options *options, struct mrfgs_matcher **matcher);
 
 // Frees a matcher, once no match of it is running; null is allowed.
 void mrfgs_matcher_free(struct mrfgs_matcher *matcher);
@@ -334,7 +333,8 @@ enum mrfgs_status mrfgs_options_device(struct mrfgs_options *options,
 
 // Sets the maximum number of CPU threads of a match, up to 1024; 0 means the processors available to the process (affinity, cgroups), or
 // the smallest of RAYON_NUM_THREADS, OMP_NUM_THREADS, SLURM_CPUS_PER_TASK and SLURM_CPUS_ON_NODE if lower.
-enum mrfgs_status mrfgs_options_threads(struct mrfgs_options *options, uint32_t threads);
+enum mrfgs_status mrfgs_options_threads(struct mrfgs_options *options,
+                                        uint32_t threads);
 
 // Makes the rectification of images of this size in pixels (0 and 0: that of the calibration), like OpenCV's stereoRectify. Alpha runs
 // from 0, where the views have no empty borders, to 1, where they contain all pixels of the images; below 0 the rectification in the
