@@ -623,6 +623,8 @@ fn warnings_are_one_line_with_the_cause() {
         (Warning::Clipped { end: 63, upper: true, percent: 9 }, ["9 %", "at disparity 63"]),
         (Warning::Clipped { end: 63, upper: true, percent: 9 }, ["cuts off", "an end of the range"]),
         (Warning::Clipped { end: -5, upper: false, percent: 9 }, ["-5", "cuts off"]),
+        (Warning::Contradicted { percent: 0 }, ["contradict the prior, so it was not used", "this scene"]),
+        (Warning::Contradicted { percent: 62 }, ["contradict the prior in part", "counts 62 %"]),
     ] {
         let line = warning.to_string();
         assert!(!line.contains('\n') && words.iter().all(|w| line.contains(w)), "{line}");

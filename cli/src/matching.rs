@@ -121,28 +121,12 @@ pub(crate) fn run(
     Ok((matched, time))
 }
 
-/// The trust in a prior from which on it goes without a warning.
-const TRUSTED: f64 = 0.9;
-
-/// Prints what became of a prior, with a warning where the images contradict it.
+/// Prints how much of a prior was used.
 fn say_prior(name: &str, used: PriorUse) {
     let PriorUse { kind, given, dropped, .. } = used;
     let text = match kind {
         PriorKind::Points => format!("{given} point{} of the prior, {dropped} dropped", plural(given)),
         PriorKind::Surface => format!("a prior for {given} pixel{}", plural(given)),
     };
-    let warning = prior_warning(used).map_or(String::new(), |warning| format!("; warning: {warning}"));
-    console::say(&format!("{name}{text}{warning}"));
-}
-
-/// The warning of a prior that the images contradict.
-pub(crate) fn prior_warning(used: PriorUse) -> Option<String> {
-    match used.trust {
-        trust if trust >= TRUSTED => None,
-        0.0 => Some(
-            "the images contradict it, so it was not used: is it of this scene, in pixels of disparity?"
-                .into(),
-        ),
-        trust => Some(format!("the images contradict it in part, so it counts {:.0} %", 100.0 * trust)),
-    }
+    console::say(&format!("{name}{text}"));
 }

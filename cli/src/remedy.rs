@@ -165,7 +165,7 @@ mod tests {
     const ROWS: Part = Part::Rows { first: 90, last: 179, of: 180 };
 
     /// Every warning, with the words that its message must contain in order.
-    const WARNINGS: [(Warning, &str); 16] = [
+    const WARNINGS: [(Warning, &str); 18] = [
         (Warning::Oriented { which: 2 }, "both images ... turn them upright with --orient"),
         (Warning::Identical, "give the right view"),
         (Warning::Plain { view: "left" }, "the left view"),
@@ -185,6 +185,8 @@ mod tests {
         (Warning::Swapped { percent: 97 }, "lower --min-disparity below 0"),
         (Warning::Clipped { end: 63, upper: true, percent: 9 }, ": raise --max-disparity"),
         (Warning::Clipped { end: -5, upper: false, percent: 9 }, ": lower --min-disparity"),
+        (Warning::Contradicted { percent: 0 }, "contradict the prior ... not used ... of this scene"),
+        (Warning::Contradicted { percent: 62 }, "contradict the prior in part ... 62 %"),
     ];
 
     /// Each message names the problem, the flag and the remedy in one line. Messages of the library name neither flags nor the program.

@@ -6,6 +6,7 @@ use super::parts::{self, Part};
 use crate::image::{Image, Orientation, Pair};
 use crate::maps::{FRACTION, Maps, flag};
 use crate::options::DisparityRange;
+use crate::prior::PriorUse;
 
 /// Fewer matches than this give no statistics.
 pub(super) const MIN_MATCHES: usize = 30;
@@ -49,6 +50,8 @@ const MEASURED_PERCENT: usize = 35;
 const FOUND_CONFIDENCE: u8 = 20;
 /// Percentage of masked pixels from which on the mask is to blame if few of the others are found (open).
 const MASKED_PERCENT: usize = 50;
+/// The trust in a prior from which on it goes without a warning.
+const TRUSTED: f64 = 0.9;
 /// Ranges with fewer labels consist of ends only.
 pub(super) const MIN_LABELS: usize = 3;
 
@@ -199,6 +202,18 @@ pub enum Warning {
         /// Whether it is the upper end.
         upper: bool,
         /// Pixels at that end, in percent of all measured ones.
+        percent: usize,
+    },
+    /// The images contradict what was known of the scene.
+    #[error(
+        "the images contradict the prior{}",
+        match percent {
+            0 => ", so it was not used: check that it is of this scene, in pixels of disparity".to_owned(),
+            percent => format!(" in part, so it counts {percent} %"),
+        }
+    )]
+    Contradicted {
+        /// How much the prior counts, in percent; 0 if it was not used.
         percent: usize,
     },
 }
@@ -386,6 +401,11 @@ pub fn warnings_of(maps: &Maps, range: DisparityRange, looks: u32) -> Vec<Warnin
         .filter(|(.., count)| 100 * count > CLIPPED_PERCENT * all)
         .map(|(end, upper, count)| Warning::Clipped { end, upper, percent: 100 * count / all })
         .collect()
+}
+
+/// The warning of a prior that the images contradict.
+pub(crate) fn of_prior(used: &PriorUse) -> Option<Warning> {
+    (used.trust < TRUSTED).then(|| Warning::Contradicted { percent: (100.0 * used.trust).round() as usize })
 }
 
 /// Statistics of the grey of a view, in 8-bit levels.

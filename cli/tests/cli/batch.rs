@@ -162,7 +162,7 @@ fn a_list_may_tell_what_is_known_of_each_scene() {
     // A prior that the images contradict gives a warning. A prior that cannot be read fails only its own pair.
     write("wrong,l.png,r.png,31,wrong.csv,,\ngone,im0.png,im1.png,31,gone.csv,,\n");
     let told = batch(&folder, "list.csv out");
-    assert!(told.stderr.contains("wrong: warning: the images contradict it"), "{}", told.stderr);
+    assert!(told.stderr.contains("wrong: warning: the images contradict the prior"), "{}", told.stderr);
     assert!(told.stderr.contains("gone: cannot read gone.csv"), "{}", told.stderr);
     assert!(told.stderr.contains("1 done, 0 skipped, 1 failed: gone"), "{}", told.stderr);
     write("a,im0.png,im1.png,31,list.csv,,\n");

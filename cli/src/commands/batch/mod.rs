@@ -23,7 +23,6 @@ use mrfgs::{Error, Matched, Matcher};
 
 use crate::args::Sign;
 use crate::failure::{self, Failure, Result};
-use crate::matching::prior_warning;
 use crate::outputs::{Claim, Format, MatchRecord, Outcome, also, files};
 use crate::progress::Counter;
 use crate::{console, remedy, stop};
@@ -323,7 +322,6 @@ impl<'a> Batch<'a> {
         let time = start.elapsed();
         let found = matched.warnings();
         warnings.extend(found.iter().map(|warning| remedy::warning(warning, &remedy::COLUMNS)));
-        warnings.extend(matched.prior.and_then(prior_warning));
         Ok((read, matched, time, warnings))
     }
 
