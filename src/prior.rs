@@ -59,6 +59,37 @@ pub struct PriorPoint {
     pub sigma: f64,
 }
 
+impl PriorPoint {
+    /// The points of a list: a line `x,y,disparity` or `x,y,disparity,sigma` for each, in px. A first line with names is skipped, and so
+    /// are empty ones. `sigma` is the standard deviation of all; without it each has its own, or else the usual one.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] for another line, with its number, and if no line has a point.
+    pub fn listed(text: &str, sigma: Option<f64>) -> Result<Vec<Self>> {
+        let value = |field: &str| field.trim().trim_matches('"').parse().ok();
+        let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
+        let mut points = Vec::new();
+        for (row, (i, line)) in lines.filter(|(_, line)| !line.trim().is_empty()).enumerate() {
+            let values: Option<Vec<f64>> = line.split(',').map(value).collect();
+            let (x, y, disparity, own) = match values.as_deref() {
+                Some(&[x, y, disparity]) => (x, y, disparity, PriorKind::Points.usual_sigma()),
+                Some(&[x, y, disparity, own]) => (x, y, disparity, own),
+                // A line with names of columns.
+                None if row == 0 => continue,
+                _ => {
+                    let reason = "not x,y,disparity or x,y,disparity,sigma in pixels";
+                    return Err(Error::Mismatch(format!("line {}: {reason}", i + 1)));
+                }
+            };
+            points.push(Self { x, y, disparity, sigma: sigma.unwrap_or(own) });
+        }
+        if points.is_empty() {
+            return Err(Error::Mismatch("there is no point".into()));
+        }
+        Ok(points)
+    }
+}
+
 /// How much of a prior a match has used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PriorUse {
@@ -284,6 +315,23 @@ mod tests {
         assert_eq!(prior.known().collect::<Vec<_>>(), [((1, 1), 1920, 64)]);
         assert_eq!(prior.halved().known().collect::<Vec<_>>(), [((0, 0), 960, 32)]);
         assert_eq!(prior.doubled().count(), 4);
+    }
+
+    #[test]
+    fn points_are_listed_with_and_without_names_and_sigma() {
+        let list = |text: &str| PriorPoint::listed(text, None).map_err(|e| e.to_string());
+        let all = [PriorPoint { sigma: 0.5, ..point(1.0, 2.0, 3.5) }, point(4.0, 5.0, 6.0)];
+        assert_eq!(list("\u{feff}x,y,d,sigma\r\n1,2,3.5,0.5\r\n\r\n 4, \"5\" , 6\r\n").unwrap(), all);
+        assert_eq!(list("1,2,3.5,0.5\n4,5,6").unwrap(), all);
+        let same = PriorPoint::listed("1,2,3.5,0.5\n4,5,6", Some(2.0)).unwrap();
+        assert_eq!(same, all.map(|point| PriorPoint { sigma: 2.0, ..point }));
+        for (text, line) in
+            [("1,2,3\n\n1,2,x\n", "line 3: "), ("x,y,d\nx,y,d\n", "line 2: "), ("1,2\n", "line 1: ")]
+        {
+            let error = list(text).unwrap_err();
+            assert!(error.starts_with(line) && error.contains("not x,y,disparity"), "{error}");
+        }
+        assert_eq!([list(""), list("x,y,d\n")], ["there is no point"; 2].map(|error| Err(error.into())));
     }
 
     #[test]

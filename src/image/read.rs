@@ -133,7 +133,7 @@ impl Reader {
     /// # Errors
     /// [`Error::Read`], like [`Reader::pair`].
     pub fn raster(self, path: &Path) -> Result<Raster<'static>> {
-        self.oriented(self.with_kind(path)?.1, path)
+        self.raster_in_memory(path, &load(path, self.max_pixels)?)
     }
 
     /// The image rotated upright, if the reader is to do that.
@@ -163,15 +163,12 @@ impl Reader {
     /// # Errors
     /// The errors of [`Reader::raster`].
     pub fn raster_in_memory(self, name: &Path, bytes: &[u8]) -> Result<Raster<'static>> {
-        let raster =
-            decode(bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(name, cause))?;
-        self.oriented(raster.named(name), name)
+        self.oriented(self.with_kind(name, bytes)?.1, name)
     }
 
-    fn with_kind(self, path: &Path) -> Result<(Option<Kind>, Raster<'static>)> {
-        let bytes = load(path, self.max_pixels)?;
-        let raster = decode(&bytes, self.max_pixels, self.no_data);
-        Ok((Kind::detect(&bytes), raster.map_err(|cause| Error::read(path, cause))?.named(path)))
+    fn with_kind(self, name: &Path, bytes: &[u8]) -> Result<(Option<Kind>, Raster<'static>)> {
+        let raster = decode(bytes, self.max_pixels, self.no_data);
+        Ok((Kind::detect(bytes), raster.map_err(|cause| Error::read(name, cause))?.named(name)))
     }
 
     /// Reads a mask from any image that [`Reader::pair`] reads: `true` where a pixel is not black (alpha does not count).
@@ -210,7 +207,15 @@ impl Reader {
     /// # Errors
     /// [`Error::Read`] when the file is missing, damaged, or holds no disparities in one of these forms.
     pub fn disparity(self, path: &Path) -> Result<Plane<f32>> {
-        self.map(path, None)
+        self.map(path, &load(path, self.max_pixels)?, None)
+    }
+
+    /// Like [`Reader::disparity`], from a file in memory, with its name for errors.
+    ///
+    /// # Errors
+    /// The errors of [`Reader::disparity`].
+    pub fn disparity_in_memory(self, name: &Path, bytes: &[u8]) -> Result<Plane<f32>> {
+        self.map(name, bytes, None)
     }
 
     /// Reads disparities times `scale`, stored as whole numbers in a PNG, TIFF or NumPy array with 8 or 16
@@ -219,17 +224,17 @@ impl Reader {
     /// # Errors
     /// [`Error::Read`] when the file is missing, damaged, or does not hold such numbers.
     pub fn scaled_disparity(self, path: &Path, scale: f32) -> Result<Plane<f32>> {
-        self.map(path, Some(scale))
+        self.map(path, &load(path, self.max_pixels)?, Some(scale))
     }
 
-    fn map(self, path: &Path, scale: Option<f32>) -> Result<Plane<f32>> {
+    fn map(self, path: &Path, bytes: &[u8], scale: Option<f32>) -> Result<Plane<f32>> {
         fn scaled<S: Sample>(values: &[S], scale: f32) -> Vec<f32> {
             let disparity = |v: f64| if v == 0.0 { f32::INFINITY } else { v as f32 / scale };
             values.iter().map(|v| disparity(v.double())).collect()
         }
         const REMEDY: &str =
             "disparity maps are .pfm, float .tif or .npy, or 16-bit .png with disparity times 256";
-        let (kind, raster) = self.with_kind(path)?;
+        let (kind, raster) = self.with_kind(path, bytes)?;
         let wrong = |what: &str| Err(Error::read(path, format!("{what}; {REMEDY}")));
         let is_png = kind == Some(Kind::Coded(ImageFormat::Png));
         if raster.channels != 1 {

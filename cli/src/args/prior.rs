@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::ValueEnum;
-use csv::{ReaderBuilder, Trim};
 use mrfgs::image::read;
 use mrfgs::low_level::text;
 use mrfgs::prior::{PriorKind, PriorPoint};
@@ -124,34 +123,13 @@ impl PriorFile<'_> {
             return Err(Failure::usage(self.names[1], reason));
         }
         let text = text::read(path, MOST_BYTES, "a list of points")?;
-        let mut reader =
-            ReaderBuilder::new().has_headers(false).flexible(true).trim(Trim::All).from_reader(&text[..]);
-        let mut points = Vec::new();
-        for (i, row) in reader.records().enumerate() {
-            let row = row.map_err(|e| self.refused(format_args!(": {e}")))?;
-            let values: Option<Vec<f64>> = row.iter().map(|value| value.parse().ok()).collect();
-            let point = match values.as_deref() {
-                Some(&[x, y, d]) => {
-                    PriorPoint { x, y, disparity: d, sigma: self.sigma_of(PriorKind::Points) }
-                }
-                Some(&[x, y, d, sigma]) => {
-                    PriorPoint { x, y, disparity: d, sigma: self.sigma.unwrap_or(sigma) }
-                }
-                // A line with names of columns.
-                None if i == 0 => continue,
-                _ => {
-                    let line = row.position().map_or(i as u64 + 1, csv::Position::line);
-                    let reason = "not x,y,disparity or x,y,disparity,sigma in pixels";
-                    return Err(self.refused(format_args!(", line {line}: {reason}")));
-                }
-            };
+        let text = str::from_utf8(&text).map_err(|_| self.refused(" is not UTF-8 text"))?;
+        let points = PriorPoint::listed(text, self.sigma).map_err(|e| self.of_library(e))?;
+        let signed = |point: PriorPoint| {
             let disparity = if sign == Sign::default() { point.disparity } else { -point.disparity };
-            points.push(PriorPoint { disparity, ..point });
-        }
-        if points.is_empty() {
-            return Err(self.refused(" holds no point"));
-        }
-        Prior::points(size, points).map_err(|e| self.of_library(e))
+            PriorPoint { disparity, ..point }
+        };
+        Prior::points(size, points.into_iter().map(signed)).map_err(|e| self.of_library(e))
     }
 }
 
@@ -188,7 +166,7 @@ mod tests {
     #[test]
     fn bad_lists_are_named_with_their_line() {
         let line = points("1,2,3\n1,2,x\n", LeftMinusRight).unwrap_err();
-        assert!(line.contains("points.csv, line 2"), "{line}");
+        assert!(line.contains("points.csv: line 2: "), "{line}");
         assert!(points("", LeftMinusRight).unwrap_err().contains("no point"));
         assert!(points("90,2,3\n", LeftMinusRight).unwrap_err().contains("none of the 1 points"));
         assert!(points("1,2,3,-1\n", LeftMinusRight).unwrap_err().contains("-1 px"));

@@ -167,7 +167,7 @@ fn a_list_may_tell_what_is_known_of_each_scene() {
     assert!(told.stderr.contains("1 done, 0 skipped, 1 failed: gone"), "{}", told.stderr);
     write("a,im0.png,im1.png,31,list.csv,,\n");
     let told = batch(&folder, "list.csv out").stderr;
-    assert!(told.contains("a: prior: list.csv, line 2: not x,y,disparity"), "{told}");
+    assert!(told.contains("a: prior: list.csv: line 2: not x,y,disparity"), "{told}");
     for (row, words) in [
         ("a,im0.png,im1.png,31,,2,\n", "line 2 & prior_sigma: there is no prior"),
         ("a,im0.png,im1.png,31,lidar.csv,-1,\n", "line 2 & prior_sigma & above 0"),
