@@ -18,7 +18,7 @@
  * function allows null. Free the result of mrfgs_..._new() with mrfgs_..._free(), once, when nothing uses it any more.
  * Texts are UTF-8 and end with a 0.
  * Versions: a program built with this header works with every later library of the same soname. Fields may be added to
- * mrfgs_maps and mrfgs_view, which contain their size, but not to the other structures. */
+ * mrfgs_maps, mrfgs_view and mrfgs_prior, which contain their size, but not to the other structures. */
 
 #ifndef MRFGS_H
 #define MRFGS_H
@@ -106,6 +106,23 @@ enum mrfgs_flag
 };
 #ifndef __cplusplus
 typedef uint8_t mrfgs_flag;
+#endif // __cplusplus
+
+// How a prior is used.
+enum mrfgs_prior_kind
+#ifdef __cplusplus
+  : uint32_t
+#endif // __cplusplus
+ {
+  // Points, and maps of which at most a fifth is known, are MRFGS_PRIOR_KIND_POINTS, other maps MRFGS_PRIOR_KIND_SURFACE.
+  MRFGS_PRIOR_KIND_AUTO = 0,
+  // Exact but sparse, as of a lidar: they are cleaned and spread, and decide where no match can be trusted.
+  MRFGS_PRIOR_KIND_POINTS = 1,
+  // Dense but coarse, as a terrain model: it only shifts the balance between disparities.
+  MRFGS_PRIOR_KIND_SURFACE = 2,
+};
+#ifndef __cplusplus
+typedef uint32_t mrfgs_prior_kind;
 #endif // __cplusplus
 
 // The calibration of a pair of cameras.
@@ -197,6 +214,49 @@ typedef struct mrfgs_maps {
   float *sigma;
   size_t sigma_stride;
 } mrfgs_maps;
+
+// A point of the left image with known disparity. All fields are in pixels.
+typedef struct mrfgs_prior_point {
+  // The column; whole numbers are centres of pixels.
+  double x;
+  // The row.
+  double y;
+  double disparity;
+  // The standard deviation of the disparity; 0 means that of the prior.
+  double sigma;
+} mrfgs_prior_point;
+
+// What is known of the left image: either points or a map. Set what is not used to 0. Strides are in bytes, from one row to the next.
+typedef struct mrfgs_prior {
+  // sizeof(mrfgs_prior).
+  size_t size;
+  // The points, or null for a map. Points outside the image are left out.
+  const struct mrfgs_prior_point *points;
+  // Number of points.
+  size_t count;
+  // Disparities in pixels, a map of the size of the left image, or null for points. NaN or infinity where nothing is known.
+  const float *disparity;
+  size_t disparity_stride;
+  // Standard deviations of the disparities in pixels, a map of the same size, where 0 means `usual_sigma`. Null means that everywhere.
+  const float *sigma;
+  size_t sigma_stride;
+  // Standard deviation in pixels where no other is given; 0 means 0.25 for points and 1 for a surface.
+  double usual_sigma;
+  // An mrfgs_prior_kind.
+  uint32_t kind;
+} mrfgs_prior;
+
+// How much of a prior was used. All fields are 0 for a match without a prior.
+typedef struct mrfgs_prior_use {
+  // Number of pixels for which a disparity was given, at the size of the match: some options halve it.
+  size_t given;
+  // Number of these that their neighbours contradict; they were dropped.
+  size_t dropped;
+  // How well the images agree with it, 0 to 1. Where they contradict it, it counts less; at 0 it was not used at all.
+  double trust;
+  // How it was used: MRFGS_PRIOR_KIND_POINTS or MRFGS_PRIOR_KIND_SURFACE.
+  uint32_t kind;
+} mrfgs_prior_use;
 
 // The destination of a rectified view, of the size mrfgs_rectification_size(). Strides are in bytes, from one row to the next.
 typedef struct mrfgs_view {
@@ -300,6 +360,17 @@ enum mrfgs_status mrfgs_match_region(const struct mrfgs_matcher *matcher,
                                      const struct mrfgs_region *region,
                                      const struct mrfgs_maps *maps);
 
+// Like mrfgs_match_region() with what is known of the scene; null means nothing. The prior is of the whole left image.
+enum mrfgs_status mrfgs_match_prior(const struct mrfgs_matcher *matcher,
+                                    const struct mrfgs_image *left,
+                                    const struct mrfgs_image *right,
+                                    const struct mrfgs_image *left_mask,
+                                    const struct mrfgs_image *right_mask,
+                                    const struct mrfgs_range *range,
+                                    const struct mrfgs_region *region,
+                                    const struct mrfgs_prior *prior,
+                                    const struct mrfgs_maps *maps);
+
 // The device of this thread's last successful match, for display; "" before the first. Valid until the next one.
 const char *mrfgs_last_device(void);
 
@@ -335,6 +406,9 @@ enum mrfgs_status mrfgs_options_device(struct mrfgs_options *options,
 // the smallest of RAYON_NUM_THREADS, OMP_NUM_THREADS, SLURM_CPUS_PER_TASK and SLURM_CPUS_ON_NODE if lower.
 enum mrfgs_status mrfgs_options_threads(struct mrfgs_options *options,
                                         uint32_t threads);
+
+// How much of its prior this thread's last successful match used.
+enum mrfgs_status mrfgs_last_prior(struct mrfgs_prior_use *used);
 
 // Makes the rectification of images of this size in pixels (0 and 0: that of the calibration), like OpenCV's stereoRectify. Alpha runs
 // from 0, where the views have no empty borders, to 1, where they contain all pixels of the images; below 0 the rectification in the
@@ -465,9 +539,9 @@ enum mrfgs_status mrfgs_check_masked(const struct mrfgs_image *left,
                                      const struct mrfgs_image *right_mask,
                                      const struct mrfgs_range *range);
 
-// The probable faults found by this thread's last mrfgs_check(), by its last mrfgs_match() (many disparities at an end of the range), or
-// by its last mrfgs_rectification_new() or mrfgs_rig_of_calibration() (a calibration for other images or in another unit), one per line;
-// "" without any. Valid until the next such call that succeeds.
+// The probable faults found by this thread's last mrfgs_check(), by its last match (many disparities at an end of the range, a prior that
+// the images contradict), or by its last mrfgs_rectification_new() or mrfgs_rig_of_calibration() (a calibration for other images or in
+// another unit), one per line; "" without any. Valid until the next such call that succeeds.
 const char *mrfgs_last_warnings(void);
 
 #ifdef __cplusplus

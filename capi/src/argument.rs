@@ -50,6 +50,14 @@ pub(crate) unsafe fn thing<'a, T>(name: &str, thing: *const T) -> Result<&'a T, 
     unsafe { thing.as_ref() }.ok_or_else(|| Failure::argument(format!("the {name} is null")))
 }
 
+/// The refusal of a structure whose field for its own size is not `size_of::<T>()`; `said` says what it is.
+pub(crate) fn wrong_size<T>(said: &str, name: &str) -> Failure {
+    Failure::argument(format!(
+        "{said}, but sizeof({name}) is {} in the library: set it, and build with the library's own header",
+        size_of::<T>()
+    ))
+}
+
 /// Writes width and height to the given places.
 ///
 /// # Safety

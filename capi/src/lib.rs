@@ -13,6 +13,7 @@ mod frame;
 mod maps;
 mod matcher;
 mod options;
+mod prior;
 mod range;
 mod rectification;
 mod rig;

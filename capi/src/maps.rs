@@ -7,6 +7,7 @@ use mrfgs::Matched;
 use mrfgs::image::Plane;
 use mrfgs::maps::flag;
 
+use crate::argument;
 use crate::frame::extent;
 use crate::status::Failure;
 
@@ -83,10 +84,7 @@ impl Maps {
         // SAFETY: the caller guarantees the size, which is the first field.
         let size = unsafe { maps.cast::<usize>().read() };
         if !SIZES.contains(&size) {
-            return Err(Failure::argument(format!(
-                "maps.size is {size}, but sizeof(mrfgs_maps) is {} in the library: set it, and build with the library's own header",
-                size_of::<Self>()
-            )));
+            return Err(argument::wrong_size::<Self>(&format!("maps.size is {size}"), "mrfgs_maps"));
         }
         let mut own = Self {
             size,

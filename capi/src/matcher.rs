@@ -12,6 +12,7 @@ use crate::argument;
 use crate::frame::{self, Image};
 use crate::maps::Maps;
 use crate::options::Options;
+use crate::prior::{self, Prior};
 use crate::range::{Range, Region};
 use crate::status::{Status, call};
 use crate::text::Said;
@@ -108,6 +109,26 @@ pub unsafe extern "C" fn mrfgs_match_region(
     region: *const Region,
     maps: *const Maps,
 ) -> Status {
+    // SAFETY: the caller guarantees all requirements.
+    unsafe {
+        mrfgs_match_prior(matcher, left, right, left_mask, right_mask, range, region, ptr::null(), maps)
+    }
+}
+
+/// Like mrfgs_match_region() with what is known of the scene; null means nothing. The prior is of the whole left image.
+#[unsafe(no_mangle)]
+#[allow(clippy::too_many_arguments, reason = "C has no default arguments")]
+pub unsafe extern "C" fn mrfgs_match_prior(
+    matcher: *const Matcher,
+    left: *const Image,
+    right: *const Image,
+    left_mask: *const Image,
+    right_mask: *const Image,
+    range: *const Range,
+    region: *const Region,
+    prior: *const Prior,
+    maps: *const Maps,
+) -> Status {
     call(|| {
         // SAFETY: the caller guarantees that the pointer is null or valid.
         let matcher = unsafe { argument::thing("matcher", matcher) }?;
@@ -117,6 +138,8 @@ pub unsafe extern "C" fn mrfgs_match_region(
         let range = unsafe { Range::searched(range) }?;
         // SAFETY: as above.
         let part = unsafe { Region::part(region) };
+        // SAFETY: as above, and that its points or maps match its fields.
+        let known = unsafe { Prior::given(prior, pair.size()) }?;
         // SAFETY: as above.
         let maps = unsafe { Maps::given(maps) }?;
         maps.check(part.as_ref().map_or(pair.size(), Rect::size))?;
@@ -130,6 +153,10 @@ pub unsafe extern "C" fn mrfgs_match_region(
                 Some(part) => job.region(part),
                 None => job,
             };
+            let job = match known {
+                Some(known) => job.prior(known),
+                None => job,
+            };
             let matched = job.method(method).cancel(&matcher.stop).run();
             // Reset before the turn ends, so that the next match is not stopped.
             matcher.stop.store(false, Ordering::Relaxed);
@@ -138,6 +165,7 @@ pub unsafe extern "C" fn mrfgs_match_region(
         // SAFETY: they were checked for this size, and the caller guarantees that they are as large as their fields say.
         unsafe { maps.write(&matched) };
         warnings::say(matched.warnings().iter().map(words::warning));
+        prior::say(matched.prior);
         DEVICE.with(|device| device.say(&matched.ran_on));
         NOTE.with(|note| note.say(&matched.note.as_ref().map(words::error).unwrap_or_default()));
         Ok(())

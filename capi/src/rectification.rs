@@ -145,11 +145,8 @@ impl View {
     fn check(&self, name: &str, size: (usize, usize)) -> Result<Layout, Failure> {
         let wrong = |what: &str| Failure::argument(format!("the {name} {what}"));
         if self.size != size_of::<Self>() {
-            return Err(wrong(&format!(
-                "has the size {}, but sizeof(mrfgs_view) is {} in the library: set it, and build with the library's own header",
-                self.size,
-                size_of::<Self>()
-            )));
+            let said = format!("the {name} has the size {}", self.size);
+            return Err(argument::wrong_size::<Self>(&said, "mrfgs_view"));
         }
         let layout = Layout::of(self.format, name)?;
         if layout.sample == Sample::Float {

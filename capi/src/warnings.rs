@@ -42,9 +42,9 @@ pub unsafe extern "C" fn mrfgs_check_masked(
     })
 }
 
-/// The probable faults found by this thread's last mrfgs_check(), by its last mrfgs_match() (many disparities at an end of the range), or
-/// by its last mrfgs_rectification_new() or mrfgs_rig_of_calibration() (a calibration for other images or in another unit), one per line;
-/// "" without any. Valid until the next such call that succeeds.
+/// The probable faults found by this thread's last mrfgs_check(), by its last match (many disparities at an end of the range, a prior that
+/// the images contradict), or by its last mrfgs_rectification_new() or mrfgs_rig_of_calibration() (a calibration for other images or in
+/// another unit), one per line; "" without any. Valid until the next such call that succeeds.
 #[unsafe(no_mangle)]
 pub extern "C" fn mrfgs_last_warnings() -> *const c_char {
     LAST.with(Said::text)

@@ -1,6 +1,6 @@
 /* Matches frames with padded rows, and compares the maps with those of the program byte by byte.
  *
- *     match-c LEFT.pnm RIGHT.pnm MAX-DISPARITY MAP.pfm CONFIDENCE.pgm VALIDITY.pgm RIGHT-MAP.pfm SIGMA.pfm REGION.pfm STEADY.pfm
+ *     match-c LEFT.pnm RIGHT.pnm MAX-DISPARITY MAP.pfm CONFIDENCE.pgm VALIDITY.pgm RIGHT-MAP.pfm SIGMA.pfm REGION.pfm STEADY.pfm KNOWN.pfm
  *
  * Then it makes every mistake that a caller can make, and matches again in a process that it forks. */
 #if defined(__unix__) || defined(__APPLE__)
@@ -11,6 +11,7 @@
 
 #include "pnm.h"
 
+#include <math.h>
 #include <mrfgs.h>
 
 #ifdef CAN_FORK
@@ -144,6 +145,107 @@ static void region(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ran
     free((void *)left.data);
     free((void *)right.data);
     free(found);
+}
+
+/* A prior gives the program's map: for its own map as a surface, `expected`. */
+static void prior(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm *map,
+                  const struct pnm *expected) {
+    const mrfgs_status ok = MRFGS_STATUS_OK, wrong = MRFGS_STATUS_ARGUMENT;
+    mrfgs_image left = spread(&frames[0], 0), right = spread(&frames[1], 3);
+    size_t width = map->width, height = map->height, stride = width * sizeof(float), pixels = width * height, bytes = stride * height;
+    float *found = malloc(bytes), *other = malloc(bytes), *given = malloc(bytes), *sigma = malloc(bytes);
+    mrfgs_maps maps = {.size = sizeof maps, .disparity = found, .disparity_stride = stride};
+    mrfgs_prior surface = {.size = sizeof surface, .disparity = (const float *)(const void *)map->data, .disparity_stride = stride,
+                           .usual_sigma = 0.5, .kind = MRFGS_PRIOR_KIND_SURFACE};
+    mrfgs_prior_use used;
+    /* The preset matches at half the size. */
+    const size_t all = (width + 1) / 2 * ((height + 1) / 2);
+#define MATCH(known) mrfgs_match_prior(matcher, &left, &right, NULL, NULL, &range, NULL, (known), &maps)
+    CHECK(MATCH(&surface) == ok);
+    CHECK(memcmp(found, expected->data, bytes) == 0);
+    CHECK(mrfgs_last_prior(&used) == ok && used.kind == MRFGS_PRIOR_KIND_SURFACE && used.given == all && used.dropped == 0);
+    CHECK(used.trust > 0.9 && used.trust <= 1 && !strstr(mrfgs_last_warnings(), "prior"));
+    /* Control: without it the map is another one, and nothing was used. */
+    CHECK(MATCH(NULL) == ok);
+    CHECK(memcmp(found, map->data, bytes) == 0 && memcmp(found, expected->data, bytes) != 0);
+    CHECK(mrfgs_last_prior(&used) == ok && used.kind == 0 && used.given == 0 && used.dropped == 0 && used.trust == 0);
+    /* The same by a map of standard deviations, half of them the usual ones, with padded rows; control: others give another map. */
+    uint8_t *padded = malloc((stride + 5) * height);
+    for (size_t i = 0; i < pixels; i++) sigma[i] = i % 2 ? 0.5f : 0;
+    for (size_t y = 0; y < height; y++) memcpy(padded + y * (stride + 5), map->data + y * stride, stride);
+    mrfgs_prior each = surface;
+    each.disparity = (const float *)(void *)padded, each.disparity_stride = stride + 5, each.sigma = sigma, each.sigma_stride = stride;
+    CHECK(MATCH(&each) == ok);
+    CHECK(memcmp(found, expected->data, bytes) == 0);
+    each.usual_sigma = 9;
+    CHECK(MATCH(&each) == ok);
+    CHECK(memcmp(found, expected->data, bytes) != 0);
+    /* One that knows nothing changes nothing, neither as a map, nor in a region, nor as points. */
+    for (size_t i = 0; i < pixels; i++) given[i] = i % 2 ? NAN : INFINITY;
+    mrfgs_prior nothing = {.size = sizeof nothing, .disparity = given, .disparity_stride = stride};
+    mrfgs_prior_point points[2048];
+    CHECK(MATCH(&nothing) == ok);
+    CHECK(memcmp(found, map->data, bytes) == 0);
+    CHECK(mrfgs_last_prior(&used) == ok && used.kind == MRFGS_PRIOR_KIND_POINTS && used.given == 0);
+    nothing.disparity = NULL, nothing.points = points;
+    CHECK(MATCH(&nothing) == ok);
+    CHECK(memcmp(found, map->data, bytes) == 0);
+    /* A map of few known pixels, and the same ones as points; a tenth of them is off and dropped. */
+    size_t count = 0;
+    for (size_t y = 0; y < height; y += 3)
+        for (size_t x = 0; x < width; x += 3) {
+            float disparity = ((const float *)(const void *)map->data)[y * width + x];
+            mrfgs_prior_point point = {(double)x, (double)y, disparity + (count % 10 == 5 ? 7.5 : 0), 0};
+            given[y * width + x] = (float)point.disparity;
+            points[count++] = point;
+        }
+    mrfgs_prior sparse = {.size = sizeof sparse, .disparity = given, .disparity_stride = stride};
+    mrfgs_prior listed = {.size = sizeof listed, .points = points, .count = count};
+    CHECK(MATCH(&sparse) == ok);
+    CHECK(mrfgs_last_prior(&used) == ok && used.kind == MRFGS_PRIOR_KIND_POINTS && used.given == count && used.dropped > count / 20);
+    maps.disparity = other;
+    CHECK(MATCH(&listed) == ok);
+    CHECK(memcmp(found, other, bytes) == 0 && memcmp(found, map->data, bytes) != 0);
+    /* Control: their standard deviations count, whether all are set or each. */
+    listed.usual_sigma = 3;
+    CHECK(MATCH(&listed) == ok);
+    CHECK(memcmp(found, other, bytes) != 0);
+    maps.disparity = found;
+    listed.usual_sigma = 0;
+    for (size_t i = 0; i < count; i++) points[i].sigma = 3;
+    CHECK(MATCH(&listed) == ok);
+    CHECK(memcmp(found, other, bytes) == 0);
+    /* One that the images contradict is not used, and a warning says so. */
+    for (size_t i = 0; i < pixels; i++) given[i] = (float)range.max - ((const float *)(const void *)map->data)[i];
+    sparse.kind = MRFGS_PRIOR_KIND_SURFACE;
+    CHECK(MATCH(&sparse) == ok);
+    CHECK(memcmp(found, map->data, bytes) == 0 && strstr(mrfgs_last_warnings(), "the images contradict the prior, so it was not used"));
+    CHECK(mrfgs_last_prior(&used) == ok && used.trust == 0 && used.given == all);
+    /* Mistakes, after which the map and the use are those of the match before. */
+    memset(found, 0x5a, bytes);
+    mrfgs_prior bad = surface;
+    bad.size = 8, refused(wrong, MATCH(&bad), "prior.size is 8", "sizeof(mrfgs_prior) is ");
+    bad = surface, bad.kind = 3, refused(wrong, MATCH(&bad), "prior.kind is 3", "0 to 2");
+    bad = surface, bad.usual_sigma = -1, refused(wrong, MATCH(&bad), "prior.usual_sigma is -1", "above 0");
+    bad = surface, bad.usual_sigma = NAN, refused(wrong, MATCH(&bad), "prior.usual_sigma is NaN", "above 0");
+    bad = surface, bad.disparity_stride = stride - 1, refused(wrong, MATCH(&bad), "prior.disparity", "less than a row needs");
+    bad = each, bad.sigma_stride = 7, refused(wrong, MATCH(&bad), "prior.sigma", "stride of 7");
+    bad = surface, bad.points = points, refused(wrong, MATCH(&bad), "points and a map", "one of them");
+    bad = surface, bad.disparity = NULL, refused(wrong, MATCH(&bad), "the prior is empty", "prior.points or prior.disparity");
+    bad = surface, bad.count = 4, refused(wrong, MATCH(&bad), "prior.points is null", "prior.count");
+    bad = listed, bad.kind = MRFGS_PRIOR_KIND_SURFACE, refused(wrong, MATCH(&bad), "prior.kind is a surface", "points");
+    bad = listed, bad.sigma = sigma, refused(wrong, MATCH(&bad), "a map of sigma", "each point");
+    points[1].sigma = -2, refused(wrong, MATCH(&listed), "point 2 of the prior", "-2 px");
+    points[0].x = NAN, refused(wrong, MATCH(&listed), "point 1 of the prior", "not a number");
+    points[0].x = -9, listed.count = 1, refused(wrong, MATCH(&listed), "none of the 1 points", "inside the left view");
+    sigma[0] = -1, each.disparity = (const float *)(const void *)map->data, each.disparity_stride = stride;
+    refused(wrong, MATCH(&each), "column 0, row 0", "-1 px");
+    given[width + 2] = 1e9f, refused(wrong, MATCH(&sparse), "column 2, row 1", "1000000000 px");
+    refused(wrong, mrfgs_last_prior(NULL), "place", "prior");
+    CHECK(mrfgs_last_prior(&used) == ok && used.given == all);
+    for (size_t i = 0; i < bytes; i++) CHECK(((const uint8_t *)found)[i] == 0x5a);
+#undef MATCH
+    free((void *)left.data), free((void *)right.data), free(found), free(other), free(given), free(sigma), free(padded);
 }
 
 /* All colour formats give the same map, and alpha acts as a mask. */
@@ -370,7 +472,7 @@ static void forked(const mrfgs_options *options, mrfgs_matcher *matcher, const s
 #endif
 
 int main(int argc, char **argv) {
-    if (argc != 11) return 2;
+    if (argc != 12) return 2;
     CHECK(strlen(mrfgs_last_error()) == 0);
     presets();
     struct pnm frames[2] = {pnm_read(argv[1]), pnm_read(argv[2])};
@@ -392,6 +494,9 @@ int main(int argc, char **argv) {
     /* 16-bit and float images are scaled by both views of a pair, but the filter sees only one. */
     if (frames[0].bytes == 1) steady(matcher, frames, range, &led);
     free(led.data);
+    struct pnm known = pnm_read(argv[11]);
+    prior(matcher, frames, range, &maps[0], &known);
+    free(known.data);
     if (frames[0].channels == 3) formats(matcher, frames, range, &maps[0]);
     warnings(matcher, frames, range);
     mistakes(options, matcher, frames);

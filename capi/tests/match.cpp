@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -20,6 +21,8 @@ static_assert(sizeof(mrfgs_image) == 2 * sizeof(void *) + 16 || sizeof(void *) !
 static_assert(offsetof(mrfgs_maps, right) == 7 * sizeof(void *), "no field moves");
 static_assert(sizeof(mrfgs_maps) == 11 * sizeof(void *), "no field moves");
 static_assert(sizeof(mrfgs_view) == 6 * sizeof(void *), "no field moves");
+static_assert(offsetof(mrfgs_prior, usual_sigma) == 7 * sizeof(void *), "no field moves");
+static_assert(sizeof(mrfgs_prior_point) == 4 * sizeof(double), "no field moves");
 
 namespace {
 
@@ -57,8 +60,17 @@ bool found(mrfgs_matcher *matcher, const pnm &left, const pnm &right, mrfgs_rang
     maps.disparity = reinterpret_cast<float *>(map.data() + 1);
     maps.disparity_stride = stride;
     const mrfgs_image views[] = {image_of(left), image_of(right)};
-    checked(mrfgs_match(matcher, &views[0], &views[1], &range, &maps));
-    bool same = true;
+    // A prior that knows nothing changes nothing.
+    const std::vector<float> unknown(expected.width * expected.height, std::numeric_limits<float>::quiet_NaN());
+    mrfgs_prior prior{};
+    prior.size = sizeof prior;
+    prior.disparity = unknown.data();
+    prior.disparity_stride = row;
+    prior.kind = MRFGS_PRIOR_KIND_SURFACE;
+    checked(mrfgs_match_prior(matcher, &views[0], &views[1], nullptr, nullptr, &range, nullptr, &prior, &maps));
+    mrfgs_prior_use used{};
+    checked(mrfgs_last_prior(&used));
+    bool same = used.kind == MRFGS_PRIOR_KIND_SURFACE && used.given == 0;
     for (std::size_t y = 0; y < expected.height; y++)
         same &= std::memcmp(&map[1 + y * stride], expected.data + y * row, row) == 0;
     return same;
