@@ -98,6 +98,6 @@ test('bad input is reported in one line', async () => {
     matcher.close();
     await assert.rejects(matcher.match(left, right, range), { message: /closed/ });
     await assert.rejects(createMatcher({ method: 'quick' }), { message: /^method is "quick": use default, / });
-    await assert.rejects(createMatcher({ device: 'gpu' }), { message: /^device is "gpu": take auto, cpu, webgpu$/ });
+    await assert.rejects(createMatcher({ device: 'gpu' }), { message: /^device is "gpu": use auto, cpu, webgpu$/ });
     await assert.rejects(createMatcher({ device: 'webgpu' }), { message: /Node.js/ });
 });
