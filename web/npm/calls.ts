@@ -21,6 +21,23 @@ export interface Bitmap {
     close(): void;
 }
 
+/** How much of a prior a match has used. */
+export interface PriorUse {
+    kind: 'points' | 'surface';
+    /** Number of pixels for which a disparity was given. */
+    given: number;
+    /** Number of these that their neighbours contradict; they were dropped. */
+    dropped: number;
+    /** How well the images agree with it, 0 to 1. Where they contradict it, it counts less; at 0 it was not used at all. */
+    trust: number;
+}
+
+/** What is known of the left view, as the engine takes it: x, y, disparity and sigma of each point (a sigma of 0 is not given), or maps. */
+export type Known = { sigma: number | undefined } & (
+    | { points: Float64Array }
+    | { disparity: Float32Array; sigmas: Float32Array | undefined; kind: 'points' | 'surface' | undefined }
+);
+
 export interface Match {
     width: number;
     height: number;
@@ -37,7 +54,9 @@ export interface Match {
     device: string;
     /** Why the match did not run on the GPU, if it was to. */
     note: string | undefined;
-    /** Likely problems of the pair or the range, with remedies. */
+    /** How much of `prior` was used; undefined without one. */
+    prior: PriorUse | undefined;
+    /** Likely problems of the pair, the range or the prior, with remedies. */
     warnings: string[];
 }
 
@@ -54,7 +73,7 @@ export interface Opened {
 export interface Calls {
     open(device: 'auto' | 'cpu' | 'webgpu'): Opened;
     /** Matches over the range, or over the one found by sparse matching if none is given. */
-    match(left: View, right: View, method: string, range: [number, number] | undefined): Match;
+    match(left: View, right: View, method: string, range: [number, number] | undefined, known: Known | undefined): Match;
 }
 
 export type Request = { [N in keyof Calls]: { id: number; call: N; args: Parameters<Calls[N]> } }[keyof Calls];

@@ -2,7 +2,7 @@
 
 import * as engine from 'engine';
 import { broken, buffers, own, words } from '../page/answers.js';
-import type { Calls, Opened, Reason, Reply, Request, View } from './calls.js';
+import type { Calls, Known, Opened, PriorUse, Reason, Reply, Request, View } from './calls.js';
 
 /** Returns a handler of requests, which loads the engine with `load` first. */
 export function answering(load: () => Promise<unknown>, post: (reply: Reply, moved: ArrayBuffer[]) => void): (request: Request) => void {
@@ -28,7 +28,7 @@ export function answering(load: () => Promise<unknown>, post: (reply: Reply, mov
         return { version: engine.version(), device: matcher.device, note, presets, reasons };
     }
 
-    async function match(left: View, right: View, method: string, given: [number, number] | undefined): Promise<ReturnType<Calls['match']>> {
+    async function match(...[left, right, method, given, known]: Parameters<Calls['match']>): Promise<ReturnType<Calls['match']>> {
         if (matcher === undefined) {
             throw new Error('the matcher is not open');
         }
@@ -36,6 +36,7 @@ export function answering(load: () => Promise<unknown>, post: (reply: Reply, mov
         const keep = <T extends { free(): void }>(value: T): T => (held.push(value), value);
         try {
             const pair = keep(pairOf(left, right));
+            know(pair, known);
             const range = given ? new engine.Range(...given) : pair.range();
             if (range === undefined) {
                 throw new Error('the disparity range cannot be determined: give minDisparity and maxDisparity');
@@ -51,6 +52,7 @@ export function answering(load: () => Promise<unknown>, post: (reply: Reply, mov
             return {
                 ...{ width, height, minDisparity: min, maxDisparity: max, device, note },
                 warnings: [...new Set([...warnings, ...(found.warnings() as { text: string }[])].map(({ text }) => text))],
+                prior: found.prior() as PriorUse | undefined,
                 disparity: own(found.disparity()),
                 confidence: own(found.confidence()),
                 reasons: own(found.validity()),
@@ -75,6 +77,14 @@ export function answering(load: () => Promise<unknown>, post: (reply: Reply, mov
             post(broken(error) ? { broken: words(error) } : { id, error: words(error) }, []);
         }
     };
+}
+
+function know(pair: engine.StereoPair, known: Known | undefined): void {
+    if (known && 'points' in known) {
+        pair.knowPoints(known.points, known.sigma);
+    } else if (known) {
+        pair.knowMap(known.disparity, known.sigma, known.sigmas, known.kind);
+    }
 }
 
 function pairOf(left: View, right: View): engine.StereoPair {

@@ -2,7 +2,7 @@
 
 import { type Matcher, type Options, opened } from './matcher.js';
 
-export type { Bitmap, Match, MatchOptions, Matcher, Options, Reason, View } from './matcher.js';
+export type { Bitmap, Match, MatchOptions, Matcher, Options, Prior, PriorMap, PriorPoints, PriorUse, Reason, View } from './matcher.js';
 
 /** Starts a worker with the engine and opens the device. */
 export function createMatcher(options: Options = {}): Promise<Matcher> {

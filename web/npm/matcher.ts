@@ -1,8 +1,8 @@
 // The matcher that programs use, and its end of the worker's messages.
 
-import type { Bitmap, Calls, Match, Opened, Reason, Reply, Request, View } from './calls.js';
+import type { Bitmap, Calls, Known, Match, Opened, PriorUse, Reason, Reply, Request, View } from './calls.js';
 
-export type { Bitmap, Match, Reason, View };
+export type { Bitmap, Match, PriorUse, Reason, View };
 
 export interface Options {
     /** A preset: `default`, `accurate`, `fast`, `paper` or `fgs`. */
@@ -11,10 +11,32 @@ export interface Options {
     device?: 'auto' | 'cpu' | 'webgpu';
 }
 
+/** Known disparities of the left view, in pixels: points, or a map of its size. */
+export type Prior = PriorPoints | PriorMap;
+
+/** Sparse, exact points: they are cleaned and spread, and decide where no match can be trusted. */
+export interface PriorPoints {
+    /** Rows of x, y, disparity, and perhaps the standard deviation; or these numbers in one array, three for each point. */
+    points: ArrayLike<ArrayLike<number>> | ArrayLike<number>;
+    /** The standard deviation of points without one of their own; by default 0.25. */
+    sigma?: number;
+}
+
+export interface PriorMap {
+    /** Row by row, NaN or Infinity where nothing is known. */
+    disparity: Float32Array;
+    /** The standard deviation, for all or for each pixel; by default 0.25 for points and 1 for a surface. */
+    sigma?: number | Float32Array;
+    /** A surface is dense but coarse, and only shifts the balance between disparities. By default points if at most a fifth is known. */
+    kind?: 'points' | 'surface';
+}
+
 export interface MatchOptions {
     /** The disparities to search, in pixels, inclusive. Without `maxDisparity`, sparse matching finds the range. */
     minDisparity?: number;
     maxDisparity?: number;
+    /** What is known of the left view beforehand. */
+    prior?: Prior;
     /** Aborts the match by ending the worker; the next match starts another one. */
     signal?: AbortSignal;
     /** Called with the fraction of the match done, 0 to 1. */
@@ -32,6 +54,7 @@ export interface Port {
 export type Start = (hear: (reply: Reply) => void, fail: (reason: string) => void) => Port;
 
 const DEVICES = ['auto', 'cpu', 'webgpu'];
+const KINDS = ['points', 'surface'];
 
 export class Matcher {
     /** The version of mrfgs. */
@@ -69,7 +92,7 @@ export class Matcher {
     }
 
     private async run(left: View | Bitmap, right: View | Bitmap, options: MatchOptions): Promise<Match> {
-        const { minDisparity = 0, maxDisparity, signal, onProgress } = options;
+        const { minDisparity = 0, maxDisparity, prior, signal, onProgress } = options;
         for (const [name, value] of Object.entries({ minDisparity, maxDisparity })) {
             if (value !== undefined && !Number.isSafeInteger(value)) {
                 throw new TypeError(`${name} is ${String(value)}: give a whole number of pixels`);
@@ -80,12 +103,13 @@ export class Matcher {
         }
         const range: [number, number] | undefined = maxDisparity === undefined ? undefined : [minDisparity, maxDisparity];
         const views = [viewOf(left, 'left'), viewOf(right, 'right')] as const;
+        const known = prior === undefined ? undefined : knownBy(prior, views[0]);
         signal?.throwIfAborted();
         const stop = () => this.link.fail(signal?.reason);
         signal?.addEventListener('abort', stop);
         this.link.onProgress = onProgress;
         try {
-            return await this.link.call('match', ...views, this.method, range);
+            return await this.link.call('match', ...views, this.method, range, known);
         } finally {
             this.link.onProgress = undefined;
             signal?.removeEventListener('abort', stop);
@@ -187,6 +211,59 @@ function known(name: string, value: string, all: readonly string[]): void {
     if (!all.includes(value)) {
         throw new TypeError(`${name} is ${JSON.stringify(value)}: use ${all.join(', ')}`);
     }
+}
+
+/** Checks the form of a prior of this view; the engine checks the values. */
+function knownBy(prior: Prior, { width, height }: View): Known {
+    const { points, disparity, sigma, kind } = (prior ?? {}) as Partial<Pick<PriorPoints, 'points'> & PriorMap>;
+    if ((points === undefined) === (disparity === undefined)) {
+        throw new TypeError('prior: give either points or disparity');
+    }
+    if (sigma !== undefined && !(sigma instanceof Float32Array) && !(Number.isFinite(sigma) && sigma > 0)) {
+        throw new TypeError(`prior.sigma is ${String(sigma)}: give pixels above 0`);
+    }
+    if (kind !== undefined && !KINDS.includes(kind)) {
+        throw new TypeError(`prior.kind is ${JSON.stringify(kind)}: use ${KINDS.join(', ')}`);
+    }
+    if (points !== undefined) {
+        if (sigma instanceof Float32Array || kind === 'surface') {
+            throw new TypeError('prior: points have a sigma of their own or one for all, and are no surface');
+        }
+        return { points: rowsOf(points), sigma };
+    }
+    const sigmas = sigma instanceof Float32Array ? sigma : undefined;
+    for (const [name, map] of Object.entries({ disparity, sigma: sigmas ?? disparity })) {
+        if (!(map instanceof Float32Array) || map.length !== width * height) {
+            throw new TypeError(`prior.${name}: give a Float32Array of ${width} x ${height} values, as the left view has pixels`);
+        }
+    }
+    return { disparity: disparity as Float32Array, sigmas, sigma: sigmas ? undefined : (sigma as number | undefined), kind };
+}
+
+/** x, y, disparity and sigma of each point, where 0 stands for no sigma. */
+function rowsOf(points: PriorPoints['points']): Float64Array {
+    const wrong = new TypeError('prior.points: give rows of x, y, disparity, and perhaps sigma, or three numbers for each point');
+    if (typeof points !== 'object' || points === null || !Number.isSafeInteger(points.length)) {
+        throw wrong;
+    }
+    const flat = typeof points[0] === 'number';
+    const count = flat ? points.length / 3 : points.length;
+    if (!Number.isInteger(count)) {
+        throw wrong;
+    }
+    const values = new Float64Array(4 * count);
+    for (let i = 0; i < count; i += 1) {
+        const row = (flat ? Array.prototype.slice.call(points, 3 * i, 3 * i + 3) : points[i]) as ArrayLike<number> | undefined;
+        if (row === undefined || row === null || (row.length !== 3 && row.length !== 4)) {
+            throw wrong;
+        }
+        // The engine refuses what is not a number.
+        values.set(Array.from(row, (value) => (typeof value === 'number' ? value : NaN)), 4 * i);
+        if (row.length === 4 && values[4 * i + 3] === 0) {
+            throw new TypeError(`prior.points: point ${i + 1} has a sigma of 0: give pixels above 0, or none`);
+        }
+    }
+    return values;
 }
 
 function viewOf(view: View | Bitmap, name: string): View {

@@ -3,7 +3,7 @@
 import { Worker } from 'node:worker_threads';
 import { type Matcher, type Options, opened } from './matcher.js';
 
-export type { Bitmap, Match, MatchOptions, Matcher, Options, Reason, View } from './matcher.js';
+export type { Bitmap, Match, MatchOptions, Matcher, Options, Prior, PriorMap, PriorPoints, PriorUse, Reason, View } from './matcher.js';
 
 /** Starts a worker thread with the engine. */
 export async function createMatcher(options: Options = {}): Promise<Matcher> {

@@ -7,6 +7,7 @@ mod matched;
 mod matcher;
 mod object;
 mod pair;
+mod prior;
 mod rectified;
 mod tables;
 mod words;

@@ -3,6 +3,7 @@
 use crate::Thrown;
 use crate::object::set;
 use crate::pair::{Cameras, StereoPair, rgba};
+use crate::prior::told;
 use crate::words::{error, thrown, warning};
 use js_sys::Array;
 use mrfgs::check::Warning;
@@ -13,6 +14,7 @@ use mrfgs::image::ply;
 use mrfgs::image::write::Writer;
 use mrfgs::image::{Plane, Rect};
 use std::path::Path;
+use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 /// The maps of a pair, and how they were computed.
@@ -88,6 +90,12 @@ impl Matched {
     #[wasm_bindgen(getter)]
     pub fn corrected(&self) -> String {
         self.matched.conditioning.to_string()
+    }
+
+    /// How much of what was known of the pair was used: `{ kind, given, dropped, trust }`; undefined if nothing was known.
+    #[must_use]
+    pub fn prior(&self) -> JsValue {
+        self.matched.prior.map_or(JsValue::UNDEFINED, told)
     }
 
     /// Number of tiles; 1 if the pair was not split.

@@ -13,6 +13,7 @@ use mrfgs::options::{DeviceChoice, Execution, MatchSize, Method};
 use mrfgs::{AutoRange, Error, Progress, Result};
 use std::cell::RefCell;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -47,7 +48,7 @@ impl Matcher {
         self.device.clone()
     }
 
-    /// Matches `pair` over `range`. `progress` is called with the stage and the fraction of the work done, and returns whether to continue.
+    /// Matches `pair` over `range`, with what is known of it. `progress` is called with the stage and the fraction of the work done, and returns whether to continue.
     /// With `half`, the pair is matched at half size. A pair that needs more than [`MEMORY`] is matched in tiles.
     ///
     /// # Errors
@@ -68,6 +69,10 @@ impl Matcher {
         } else {
             self.matcher.job(&pair.pair, range.range)
         };
+        let job = match &pair.prior {
+            Some(prior) => job.prior(Arc::clone(prior)),
+            None => job,
+        };
         let matched = job.method(&method).on_progress(tell).run_async().await;
         LISTENER.set(None);
         Ok(Matched { matched: matched.map_err(thrown)? })
@@ -82,7 +87,8 @@ impl Matcher {
 pub fn tiles(pair: &StereoPair, preset: &str, range: &Range, half: bool) -> Thrown<usize> {
     let (width, height) = pair.pair.size();
     let count = || {
-        let plan = Plan::new(width, height, range.range, &method(preset, half)?)?;
+        let plan =
+            Plan::new(width, height, range.range, &method(preset, half)?)?.with_prior(pair.prior.is_some());
         Ok(Tiles::new(&plan)?.count())
     };
     count().map_err(|error: Error| thrown(error))

@@ -11,8 +11,10 @@ use mrfgs::image::raster::{Raster, Sample};
 use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, Plane};
 use mrfgs::options::DisparityRange;
+use mrfgs::prior::Prior;
 use std::borrow::Cow;
 use std::path::Path;
+use std::sync::Arc;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 /// A rectified pair.
@@ -23,6 +25,8 @@ pub struct StereoPair {
     pub(crate) by: Option<By>,
     /// Horizontal distance of the principal points in pixels, if a calibration has rectified the pair.
     pub(crate) doffs: Option<f64>,
+    /// What is known of the left view.
+    pub(crate) prior: Option<Arc<Prior>>,
 }
 
 #[wasm_bindgen]
@@ -35,7 +39,7 @@ impl StereoPair {
     pub fn new(left: &[u8], left_name: &str, right: &[u8], right_name: &str) -> Thrown<Self> {
         let files = ((Path::new(left_name), left), (Path::new(right_name), right));
         let reader = Reader { orient: true, ..Reader::default() };
-        Ok(Self { pair: reader.pair_in_memory(files.0, files.1).map_err(thrown)?, by: None, doffs: None })
+        Ok(Self::of(reader.pair_in_memory(files.0, files.1).map_err(thrown)?, None))
     }
 
     /// A pair from memory: rows of grey, grey and alpha, RGB or RGBA without gaps. The number of samples gives the number of channels.
@@ -112,6 +116,13 @@ impl StereoPair {
     }
 }
 
+impl StereoPair {
+    /// A pair of which nothing else is known, perhaps rectified.
+    pub(crate) fn of(pair: Pair, by: Option<By>) -> Self {
+        Self { pair, by, doffs: None, prior: None }
+    }
+}
+
 fn of_samples<S: Sample>(left: (&[S], (usize, usize)), right: (&[S], (usize, usize))) -> Thrown<StereoPair> {
     fn view<S: Sample>((samples, (width, height)): (&[S], (usize, usize))) -> mrfgs::Result<Raster<'_>> {
         let pixels = width.saturating_mul(height);
@@ -119,7 +130,7 @@ fn of_samples<S: Sample>(left: (&[S], (usize, usize)), right: (&[S], (usize, usi
         Raster::new(width, height, channels, S::samples(Cow::Borrowed(samples)))
     }
     let pair = view(left).and_then(|left| Pair::of_frames(left, view(right)?));
-    Ok(StereoPair { pair: pair.map_err(thrown)?, by: None, doffs: None })
+    Ok(StereoPair::of(pair.map_err(thrown)?, None))
 }
 
 /// Disparities to search, in pixels, inclusive.

@@ -170,6 +170,6 @@ impl Rectified {
     fn new(by: &Rectification, pair: &StereoPair, what: By) -> Thrown<Self> {
         let rectified = by.apply(&pair.pair).map_err(thrown)?;
         let notes = by.doubts().iter().map(doubt).collect();
-        Ok(Self { pair: StereoPair { pair: rectified, by: Some(what), doffs: None }, cameras: None, notes })
+        Ok(Self { pair: StereoPair::of(rectified, Some(what)), cameras: None, notes })
     }
 }

@@ -64,6 +64,43 @@ test('16-bit grey views give the map of the program', async () => {
     same(await matcher.match(...grey, range), program(...names, '--method', 'fast'));
 });
 
+test('a prior gives the map of the program', async () => {
+    const poster = (name) => join(root, 'testdata/poster', name);
+    const files = ['im0.png', 'im1.png'].map(poster);
+    const views = files.map((file) => PNG.sync.read(readFileSync(file)));
+    const matcher = await createMatcher({ method: 'fast' });
+    const match = (prior) => matcher.match(...views, { ...range, prior });
+    const expected = program(...files, '--method', 'fast', '--prior', poster('lidar.csv'));
+    writeFileSync(join(folder, 'known.pfm'), readFileSync(join(folder, 'map.pfm')));
+    const points = readFileSync(poster('lidar.csv'), 'utf8').trim().split('\n').map((line) => line.split(',').map(Number)).filter((row) => row.every(Number.isFinite));
+    const found = await match({ points });
+    same(found, expected);
+    assert.deepEqual([found.prior.kind, found.prior.given], ['points', points.length]);
+    assert.ok(found.prior.dropped > 0 && found.prior.trust > 0.9 && found.warnings.every((text) => !text.includes('prior')), JSON.stringify(found.prior));
+    same(await match({ points: points.flat() }), expected);
+    same(await match({ points: new Float64Array(points.flat()), sigma: 0.25 }), expected);
+    same(await match({ points: points.map((row) => [...row, 0.25]), sigma: 3 }), expected);
+    // Control: without it, and with another sigma, the map is another one.
+    const without = await matcher.match(...views, range);
+    assert.equal(without.prior, undefined);
+    assert.throws(() => same(without, expected));
+    const unsure = await match({ points, sigma: 3 });
+    assert.throws(() => same(unsure, expected));
+    // That map as a surface.
+    const surface = { disparity: found.disparity, kind: 'surface' };
+    const flags = ['--prior', join(folder, 'known.pfm'), '--prior-kind', 'surface', '--prior-sigma', '2'];
+    const bySurface = program(...files, '--method', 'fast', ...flags);
+    same(await match({ ...surface, sigma: 2 }), bySurface);
+    same(await match({ ...surface, sigma: new Float32Array(found.disparity.length).fill(2) }), bySurface);
+    assert.throws(() => same(found, bySurface));
+    // One that knows nothing changes nothing, and one that the images contradict is not used.
+    const nothing = await match({ disparity: new Float32Array(found.disparity.length).fill(NaN) });
+    assert.deepEqual([nothing.disparity, nothing.prior.given], [without.disparity, 0]);
+    const wrong = await match({ disparity: found.disparity.map((d) => 47 - d) });
+    assert.deepEqual([wrong.disparity, wrong.prior.trust], [without.disparity, 0]);
+    assert.match(wrong.warnings.join('\n'), /^the images contradict the prior, so it was not used: /m);
+});
+
 test('the range is found if not given, and concurrent matches run in turn', async () => {
     const matcher = await createMatcher({ method: 'fast', device: 'cpu' });
     const [first, second] = await Promise.all([matcher.match(left, right), matcher.match(left, right, range)]);
@@ -92,6 +129,25 @@ test('bad input is reported in one line', async () => {
         [[left, right, { maxDisparity: 4.5 }], /^maxDisparity is 4.5.*$/],
         [[left, right, { minDisparity: 1 }], /^minDisparity is given without maxDisparity.*$/],
     ];
+    const priors = [
+        [{}, /^prior: give either points or disparity$/],
+        [{ points: [], disparity: new Float32Array(1) }, /^prior: give either points or disparity$/],
+        [{ points: [[1, 2]] }, /^prior.points: give rows of x, y, disparity, .*$/],
+        [{ points: [1, 2, 3, 4] }, /^prior.points: give rows of x, y, disparity, .*$/],
+        [{ points: 'lidar.csv' }, /^prior.points: give rows of x, y, disparity, .*$/],
+        [{ points: [[1, 2, 3], [1, 2, NaN]] }, /^point 2 of the prior has a value that is not a number$/],
+        [{ points: [[1, 2, 3, -1]] }, /^point 1 of the prior .* -1 px.*$/],
+        [{ points: [[1, 2, 3, 0]] }, /^prior.points: point 1 has a sigma of 0.*$/],
+        [{ points: [[400, 2, 3]] }, /^none of the 1 points .* 320 x 240 pixels$/],
+        [{ points: [[1, 2, 3]], sigma: -1 }, /^prior.sigma is -1: give pixels above 0$/],
+        [{ points: [[1, 2, 3]], kind: 'surface' }, /^prior: points .* no surface$/],
+        [{ disparity: new Float32Array(7) }, /^prior.disparity: give a Float32Array of 320 x 240 values.*$/],
+        [{ disparity: [1, 2, 3] }, /^prior.disparity: give a Float32Array.*$/],
+        [{ disparity: new Float32Array(320 * 240), sigma: new Float32Array(7) }, /^prior.sigma: give a Float32Array of 320 x 240.*$/],
+        [{ disparity: new Float32Array(320 * 240), sigma: new Float32Array(320 * 240) }, /^the prior at column 0, row 0 .* not above 0$/],
+        [{ disparity: new Float32Array(320 * 240), kind: 'dots' }, /^prior.kind is "dots": use points, surface$/],
+    ];
+    cases.push(...priors.map(([prior, message]) => [[left, right, { ...range, prior }], message]));
     for (const [args, message] of cases) {
         await assert.rejects(matcher.match(...args), { message });
     }
