@@ -11,7 +11,7 @@ import { painted } from './paint';
 import { PointsTab } from './points';
 import { told } from './readout';
 import { lit } from './relief';
-import type { Cameras, Colours, Comparison, Device, Facts, Known, Map, Pair, Picture, Range, Result, Size, Warning } from './protocol';
+import type { Cameras, Colours, Comparison, Device, Facts, Known, Map, Pair, Picture, Prior, PriorUse, Range, Result, Size, Warning } from './protocol';
 import { Remarks } from './remarks';
 import { Ruler } from './ruler';
 import { stem } from './save';
@@ -51,6 +51,8 @@ interface Read extends Pair {
     cameras: Cameras | undefined;
     range: Range | undefined;
     files: string;
+    /** What the engine has of the prior. */
+    known: Prior | undefined;
     /** Generation of the worker that holds the pair. */
     generation: number;
 }
@@ -63,8 +65,8 @@ const client = new Client(new URL(WORKER, document.baseURI));
 const settings = new Settings(() => void checkRange());
 const slots = new Slots(
     SCENES,
-    ({ match, rectify: by, swapped }) => {
-        if (!swapped) {
+    ({ match, rectify: by, same }) => {
+        if (!same) {
             rectify = by;
         }
         void load(match);
@@ -299,11 +301,29 @@ async function open(signal: AbortSignal, left: Opened, right: Opened): Promise<R
     if (by === 'matches' && !rectified) {
         rectify = 'failed';
     }
+    const { prior } = slots;
+    const given = prior && (await tried(() => call('know', prior.file, prior.name)));
+    if (prior && !given) {
+        slots.cannotUse(prior);
+    }
+    sayPrior(given, undefined);
     say('pair-problem', problems.join(' '));
-    const read = { files, size: { width, height }, generation };
+    const read = { files, size: { width, height }, known: given, generation };
     return rectified
         ? { ...rectified, ...read, by, range: undefined }
         : { ...raw, ...read, by: undefined, notes: known?.notes ?? [], cameras: known?.cameras, range: known?.range };
+}
+
+/** Tells what is known, and once it was used how much of it was dropped. */
+function sayPrior(known: Prior | undefined, used: PriorUse | undefined): void {
+    if (!known) {
+        say('prior-note', undefined);
+        return;
+    }
+    const { kind, given } = known;
+    const what = `${kind === 'points' ? 'point' : 'pixel'}${given === 1 ? '' : 's'}`;
+    const dropped = kind === 'points' && used ? `, ${count(used.dropped)} dropped` : '';
+    say('prior-note', `${slots.prior?.name}: ${count(given)} ${what} known beforehand${dropped}`);
 }
 
 /** Changes the rectification of the pair, and matches it. */
@@ -497,6 +517,7 @@ async function present(): Promise<void> {
     const notes = [...(pair?.notes ?? []), ...(corrected ? [corrected] : []), ...(tiles > 1 ? [`matched in ${tiles} tiles`] : [])];
     remarks.note(notes, pair?.by !== undefined, short);
     by('outcome').hidden = false;
+    sayPrior(pair?.known, result.prior);
     address();
     say('comparison', undefined);
     say('save-problem', undefined);
@@ -542,7 +563,7 @@ function forget(): void {
     legend.none();
     points.forget();
     by('outcome').hidden = true;
-    for (const id of ['facts', 'comparison', 'readout', 'problem', 'range-found', 'range-problem', 'save-problem', 'stage']) {
+    for (const id of ['facts', 'comparison', 'readout', 'prior-note', 'problem', 'range-found', 'range-problem', 'save-problem', 'stage']) {
         say(id, undefined);
     }
     by('map').dataset['shown'] = '';

@@ -71,6 +71,20 @@ export interface Known {
     notes: string[];
 }
 
+/** What is known of the left view. */
+export interface Prior {
+    kind: 'points' | 'surface';
+    /** Number of pixels for which a disparity was given. */
+    given: number;
+}
+
+/** How much of it was used. */
+export interface PriorUse extends Prior {
+    /** Number of these that their neighbours contradict. */
+    dropped: number;
+    trust: number;
+}
+
 /** A likely problem, and the remedy that the page can apply. */
 export interface Warning {
     text: string;
@@ -94,6 +108,8 @@ export interface Result {
     warnings: Warning[];
     /** The corrections made to the pair, in words. */
     corrected: string;
+    /** How much of what was known was used. */
+    prior: PriorUse | undefined;
     tiles: number;
     /** Whether it was matched at half size, and whether for lack of memory. */
     half: boolean;
@@ -143,6 +159,8 @@ export interface Calls {
     open(device: Device): string;
     /** Decodes both images and makes them the worker's pair. */
     pair(left: Blob, leftName: string, right: Blob, rightName: string): Pair;
+    /** Takes what a file knows of the left view of the pair. */
+    know(file: Blob, name: string): Prior;
     /** The range found by sparse matching. */
     range(): Range | undefined;
     /** Likely problems of the pair or of this range. */

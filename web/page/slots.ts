@@ -6,6 +6,7 @@ import { by, count, make, say, words } from './dom';
 import { type Named, dropped, named } from './dropped';
 import { type Header, header, isHeif } from './header';
 import { inOrder, ordered } from './order';
+import { apart } from './prior';
 import type { Picture, Text } from './protocol';
 import { Turns } from './turns';
 
@@ -38,8 +39,8 @@ export interface Wish {
     match?: boolean;
     /** Rectify by matches. */
     rectify?: 'matches';
-    /** The same pair with its views swapped. */
-    swapped?: boolean;
+    /** The same pair, so its rectification stays. */
+    same?: boolean;
 }
 
 /** Where files come from. */
@@ -49,7 +50,9 @@ interface Source {
     /** Name of the pair, if it is not that of its files. */
     name?: string | undefined;
     /** The scene that they belong to. */
-    scene?: string;
+    scene?: string | undefined;
+    /** What is known of the left view. */
+    prior?: Named | undefined;
     wish?: Wish;
 }
 
@@ -66,6 +69,7 @@ function cutting(parts: Halves | [Blob, Blob]): string {
 
 const other = (side: Side): Side => (side === 'left' ? 'right' : 'left');
 const listed = (files: { name: string }[]): string => files.map(({ name }) => name).join(', ');
+const untimely = ({ name }: Named): string => `Give ${name} once both views are there: it is of the left one.`;
 const keeping = (files: Text[]): string => `${listed(files)} is kept for your pair.`;
 /** The files that a calibration may have. */
 const MOST = 3;
@@ -82,6 +86,8 @@ export class Slots {
     scene: string | undefined;
     /** Name of the pair, if it is not that of its files. */
     name: string | undefined;
+    /** What is known of the left view, as long as the page can use it. */
+    prior: Named | undefined;
     /** Whether the user has not given or asked for anything yet. */
     untouched = true;
     /** The last image, if it came alone. */
@@ -108,6 +114,16 @@ export class Slots {
             input.addEventListener('click', () => (input.value = ''));
             input.addEventListener('cancel', () => this.hold(side));
         }
+        const input = by<HTMLInputElement>('prior-file');
+        input.addEventListener('change', () => {
+            const [file] = [...(input.files ?? [])].map(named);
+            if (file) {
+                void this.inTurn(async () => this.know(file));
+            }
+        });
+        input.addEventListener('click', () => (input.value = ''));
+        by('add-prior').addEventListener('click', () => input.click());
+        by('forget-prior').addEventListener('click', () => void this.inTurn(async () => this.know(undefined)));
         by('swap').addEventListener('click', () => void this.swap());
         for (const how of ['beside', 'above'] as const) {
             by(`cut-${how}`).addEventListener('click', () => void this.inTurn(() => this.cut(this.whole(this.views), { how, leftFirst: true })));
@@ -134,8 +150,14 @@ export class Slots {
     }
 
     /** Takes files, or reports why not and changes nothing. */
-    private async add(files: Named[], source: Source): Promise<void> {
+    private async add(all: Named[], given: Source): Promise<void> {
         this.quiet();
+        const { prior, others: files } = await apart(all, given.name !== undefined, this.missing === undefined);
+        if (prior && files.length === 0) {
+            this.know(prior);
+            return;
+        }
+        const source = { ...given, prior };
         const { side } = source;
         const texts = files.filter(({ name }) => TEXT.test(name) && !OTHER.test(name));
         const others = files.filter(({ name }) => !TEXT.test(name));
@@ -157,8 +179,8 @@ export class Slots {
             this.problem(side, words(error));
             return;
         }
-        const given = await Promise.all(texts.map(async ({ file, name }) => ({ name, text: await file.text() })));
-        const calibration = await this.completed(this.own && images.length === 0 ? this.calibration : this.kept, given);
+        const written = await Promise.all(texts.map(async ({ file, name }) => ({ name, text: await file.text() })));
+        const calibration = await this.completed(this.own && images.length === 0 ? this.calibration : this.kept, written);
         const [one, two] = read;
         if (one && two) {
             this.put({ left: one, right: two }, source, calibration);
@@ -168,7 +190,7 @@ export class Slots {
         } else if (one) {
             await this.addOne(one, source, calibration);
         } else {
-            this.calibrate(calibration);
+            this.calibrate(calibration, prior);
         }
     }
 
@@ -184,7 +206,7 @@ export class Slots {
         let problem: string | undefined;
         if (parts) {
             try {
-                await this.cut(view, parts, calibration);
+                await this.cut(view, parts, calibration, source.prior);
                 return;
             } catch (error) {
                 problem = words(error);
@@ -200,7 +222,8 @@ export class Slots {
             say('pair-note', `${stays.name} is still the ${other(side)} view${files && `, and ${files} the calibration`}.`);
         } else if (this.missing) {
             const begins = pair ? `${view.name} begins a new pair. Give its other view, too. ` : '';
-            say('pair-note', `${begins}${calibration.length > 0 ? keeping(calibration) : ''}`.trim());
+            const known = source.prior ? `${untimely(source.prior)} ` : '';
+            say('pair-note', `${begins}${known}${calibration.length > 0 ? keeping(calibration) : ''}`.trim());
         }
     }
 
@@ -228,13 +251,32 @@ export class Slots {
     }
 
     /** A calibration without views. */
-    private calibrate(files: Text[]): void {
+    private calibrate(files: Text[], prior = this.prior): void {
         const { left, right } = this.views;
         if (left && right && this.scene === undefined) {
-            this.put({ left, right }, { name: this.name }, files, this.last);
+            this.put({ left, right }, { name: this.name, prior }, files, this.last);
         } else {
             this.kept = files;
-            say('pair-note', keeping(files));
+            say('pair-note', `${prior && prior !== this.prior ? `${untimely(prior)} ` : ''}${keeping(files)}`);
+        }
+    }
+
+    /** Takes what is known of the left view, or forgets it. */
+    private know(prior: Named | undefined): void {
+        if (prior && this.missing) {
+            throw new Error(untimely(prior));
+        }
+        this.prior = prior;
+        this.quiet();
+        this.render();
+        this.changed({ same: true });
+    }
+
+    /** Forgets what is known, as it does not fit the pair. */
+    cannotUse(prior: Named): void {
+        if (this.prior === prior) {
+            this.prior = undefined;
+            this.render();
         }
     }
 
@@ -253,13 +295,14 @@ export class Slots {
     }
 
     /** Sets the views, one of which may have come `alone`. */
-    private put(views: Views, { scene, name = scene, wish = {} }: Source, calibration: Text[] = [], alone?: View): void {
+    private put(views: Views, { scene, name = scene, wish = {}, prior }: Source, calibration: Text[] = [], alone?: View): void {
         const { left, right } = views;
         if (scene === undefined) {
             // Files from the user take precedence over a scene that is still loading.
             this.fetches.next();
         }
         [this.views, this.scene, this.name, this.last] = [views, scene, name, alone];
+        this.prior = left && right ? prior : undefined;
         if (left && right) {
             const before = scene === undefined && this.calibration.length === 0 ? this.kept : [];
             const given = calibration.length > 0 ? calibration : before;
@@ -284,7 +327,7 @@ export class Slots {
     }
 
     /** Splits an image into both views, or takes the two that its file holds. */
-    private async cut(one: View | undefined, parts: Halves | [Blob, Blob], calibration: Text[] = []): Promise<void> {
+    private async cut(one: View | undefined, parts: Halves | [Blob, Blob], calibration: Text[] = [], prior?: Named): Promise<void> {
         if (!one) {
             return;
         }
@@ -297,7 +340,7 @@ export class Slots {
                 this.read({ file: first, name: `${name} left.${end}` }),
                 this.read({ file: second, name: `${name} right.${end}` }),
             ]);
-            this.put({ left, right }, { name }, calibration);
+            this.put({ left, right }, { name, prior }, calibration);
         } catch (error) {
             throw new Error(`${one.name} cannot be cut: ${words(error)}`);
         }
@@ -361,6 +404,8 @@ export class Slots {
             button.setAttribute('aria-pressed', String(button.dataset['scene'] === this.scene));
         }
         by('cut').hidden = !this.whole(this.views);
+        by('add-prior').hidden = this.missing !== undefined || this.prior !== undefined;
+        by('forget-prior').hidden = this.prior === undefined;
     }
 
     /** Puts the file of a view into its input, for screen readers. */
@@ -386,7 +431,7 @@ export class Slots {
             this.views = { ...(right && { left: right }), ...(left && { right: left }) };
             this.quiet();
             this.render();
-            this.changed({ match, swapped: true });
+            this.changed({ match, same: true });
         });
     }
 

@@ -2,7 +2,7 @@
 
 import init, * as engine from 'engine';
 import { broken, buffers, own, words } from './answers';
-import type { Calls, Cameras, Device, Name, Pair, Picture, Range, Reply, Request, Size, Text, Warning } from './protocol';
+import type { Calls, Cameras, Device, Name, Pair, Picture, Prior, PriorUse, Range, Reply, Request, Size, Text, Warning } from './protocol';
 import { spread } from './spread';
 
 declare const self: DedicatedWorkerGlobalScope;
@@ -162,6 +162,9 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
         raw.free();
         return { ...pictures(pair), notes, cameras };
     },
+    async know(file, name) {
+        return need(pair, 'pair').knowFile(await bytes(file), name) as Prior;
+    },
     range() {
         const found = need(pair, 'pair').range();
         if (found === undefined) {
@@ -188,6 +191,7 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
             ...{ width, height, range: { min, max }, iterations, device: await named(found.device), note, took, corrected, tiles, half, short },
             ...{ disparity, validity, spread: seen },
             warnings: found.warnings() as Warning[],
+            prior: found.prior() as PriorUse | undefined,
             confidence: own(found.confidence()),
             picture: picture(width, height, found.picture('disparity', colours, seen.min, seen.max)),
         };
