@@ -194,6 +194,15 @@ class Match(unittest.TestCase):
         # Control: without it, or as a surface, the map is another.
         self.assertFalse(np.array_equal(found().disparity, expected))
         self.assertFalse(np.array_equal(found(prior=known, prior_kind="surface", prior_sigma=2).disparity, expected))
+        # One that the images contradict is not used, and a warning says so; the right one gives none.
+        wrong = np.where(np.isfinite(known), 13 - known, np.nan).astype(np.float32)
+        with self.assertWarnsRegex(mrfgs.MatchWarning, "the images contradict the prior, so it was not used"):
+            unused = mrfgs.match(left, right, 15, device="cpu", prior=wrong)
+        self.assertTrue(np.array_equal(unused.disparity, found().disparity))
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            mrfgs.match(left, right, 15, device="cpu", prior=known)
+        self.assertFalse([str(one.message) for one in told if "prior" in str(one.message)])
         for keywords, word in (({"prior": known[:9]}, "shape"), ({"prior_sigma": 1}, "give a prior"), ({"prior": points, "prior_sigma": -1}, "-1 px"),
                                ({"prior": points + 900}, "none of the")):
             with self.assertRaisesRegex(ValueError, word):
