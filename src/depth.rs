@@ -107,6 +107,17 @@ impl Rig {
         self.to_original.map_or(point, |matrix| rotated(&matrix, point))
     }
 
+    /// Where the left view shows a point: its column, row and disparity, in pixels. The inverse of [`Rig::point`]. `None` for a point that
+    /// is not in front of the cameras.
+    #[must_use]
+    pub fn seen(&self, point: [f64; 3]) -> Option<[f64; 3]> {
+        let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.camera;
+        let from_original = self.to_original.filter(|_| self.frame == PointFrame::Original);
+        let [x, y, z] = from_original.map_or(point, |matrix| rotated(&transposed(&matrix), point));
+        let seen = [x * fx / z + cx, y * fy / z + cy, self.disparity(z)];
+        (z > 0.0 && seen.iter().all(|v| v.is_finite())).then_some(seen)
+    }
+
     /// The depths of a map of disparities in pixels; +infinity where there is no depth.
     #[must_use]
     pub fn depths(&self, disparities: &Plane<f32>) -> Plane<f32> {
@@ -271,6 +282,20 @@ mod tests {
         assert_eq!(rig.point(2.0, 1.0, 60.0), Some([0.0, 0.0, 2000.0]));
         assert_eq!(rig.point(3.0, 2.0, 60.0), Some([2.0, 4.0, 2000.0]));
         assert_eq!(rig.point(3.0, 2.0, -20.0), None);
+    }
+
+    #[test]
+    fn points_are_seen_where_they_come_from() {
+        let rig = Rig::new(&calibration()).unwrap();
+        let turned = rig.in_original_frame(&[[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
+        for rig in [rig, turned] {
+            let seen = rig.seen(rig.point(3.0, 2.0, 60.0).unwrap()).unwrap();
+            assert!(seen.iter().zip([3.0, 2.0, 60.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{seen:?}");
+            assert_eq!(
+                [[1.0, 1.0, 0.0], [1.0, 1.0, -5.0], [f64::NAN; 3]].map(|point| rig.seen(point)),
+                [None; 3]
+            );
+        }
     }
 
     #[test]

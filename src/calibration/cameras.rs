@@ -70,6 +70,13 @@ impl Pose {
     /// The pose of a camera relative to itself.
     pub(super) const IN_PLACE: Self = Self { rotation: IDENTITY, translation: [0.0; 3] };
 
+    /// R `point` + T.
+    #[must_use]
+    pub fn moved(&self, point: [f64; 3]) -> [f64; 3] {
+        let turned = rotated(&self.rotation, point);
+        std::array::from_fn(|i| turned[i] + self.translation[i])
+    }
+
     /// The inverse pose.
     pub(super) fn inverse(&self) -> Self {
         let rotation = transposed(&self.rotation);

@@ -71,14 +71,26 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     pair(&image(left, &cameras)?, &image(right, &cameras)?, Unit::Unknown)
 }
 
-/// Reads a line of `images.txt`: image number, quaternion, translation, camera number, name.
-fn image<'a>(entry: Entry<'a>, cameras: &Entry) -> Result<Posed<'a>> {
+/// The pose of the first image of `images.txt`, from the frame of the reconstruction; `None` for other files.
+pub(super) fn first_image(entries: &Entries) -> Option<Result<Pose>> {
+    let images = entries.find(IMAGES)?.items();
+    let first = images.map(|images| images.into_iter().next());
+    first.transpose().map(|first| first.and_then(|image| Ok(placed(&image)?.0)))
+}
+
+/// The pose in a line of `images.txt`, and the number of the camera.
+fn placed(entry: &Entry) -> Result<(Pose, f64)> {
     let expected = "IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME";
     let words = entry.items()?;
     let [_, numbers @ .., _] = &words[..] else { return Err(entry.wrong(expected)) };
     let numbers = numbers.iter().map(Entry::number).collect::<Result<Vec<_>>>()?;
     let [w, x, y, z, tx, ty, tz, id] = numbers[..] else { return Err(entry.wrong(expected)) };
-    let pose = Pose { rotation: entry.quaternion([w, x, y, z])?, translation: [tx, ty, tz] };
+    Ok((Pose { rotation: entry.quaternion([w, x, y, z])?, translation: [tx, ty, tz] }, id))
+}
+
+/// Reads a line of `images.txt`: image number, quaternion, translation, camera number, name.
+fn image<'a>(entry: Entry<'a>, cameras: &Entry) -> Result<Posed<'a>> {
+    let (pose, id) = placed(&entry)?;
     let mut found = None;
     for camera in cameras.items()? {
         if camera.items()?.first().map(Entry::number).transpose()? == Some(id)

@@ -2,7 +2,7 @@
 //!
 //! [`read`] takes the files of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, VINS-Fusion, Basalt, ZED, OAK and RealSense cameras, COLMAP, mrcal,
 //! OKVIS, KITTI, Cityscapes and Middlebury, and tells them apart by their content. [`third::read`] reads a camera beside the pair, into
-//! whose view depths can be rendered.
+//! whose view depths can be rendered, and [`pose::read`] the place of a lidar.
 
 mod basalt;
 pub mod cameras;
@@ -26,6 +26,7 @@ mod opencv;
 mod orbslam;
 mod ost;
 mod parts;
+pub mod pose;
 mod posed;
 mod realsense;
 mod ros;

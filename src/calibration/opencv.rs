@@ -266,8 +266,8 @@ pub(super) fn camera(entry: &Entry) -> Result<([f64; 2], [f64; 2])> {
 }
 
 /// The rotation from the left camera to another one, which errors call `other`.
-pub(super) fn rotation_to(entries: &Entries, other: &str) -> Result<Matrix> {
-    let expected = format!("the rotation from the left camera to {other}, 3 x 3 or a rotation vector");
+pub(super) fn rotation_of(entries: &Entries, what: &str) -> Result<Matrix> {
+    let expected = format!("{what}, 3 x 3 or a rotation vector");
     let entry = entries.require(ROTATION, "R", &expected)?;
     match entry.numbers::<3>(&expected) {
         Ok(vector) => Ok(rotation(vector)),
@@ -277,7 +277,7 @@ pub(super) fn rotation_to(entries: &Entries, other: &str) -> Result<Matrix> {
 
 /// The pose of the right camera relative to the left one.
 pub(super) fn pose(entries: &Entries) -> Result<Pose> {
-    let rotation = rotation_to(entries, "the right one")?;
+    let rotation = rotation_of(entries, "the rotation from the left camera to the right one")?;
     let expected = "3 numbers, the left camera in the frame of the right one";
     let entry = entries.require(TRANSLATION, "T", expected)?;
     let translation: [f64; 3] = entry.numbers(expected)?;

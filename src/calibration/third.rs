@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::cameras::{Pose, ThirdCamera};
+use super::cameras::ThirdCamera;
 use super::node::Entries;
-use super::{depthai, in_form, kalibr, opencv, root, text};
+use super::{depthai, in_form, kalibr, opencv, pose, root, text};
 use crate::error::{Error, Result};
 use crate::image::read::MAX_PIXELS;
 
@@ -45,19 +45,8 @@ fn one(entries: &Entries) -> Result<ThirdCamera> {
     let size = opencv::size(entries)?.ok_or_else(|| {
         Error::read(entries.path(), "image_size is missing: expected width and height of its images")
     })?;
-    Ok(ThirdCamera { lens, pose: pose(entries)?, size, unit: opencv::unit(entries)? })
-}
-
-/// The pose relative to the left camera. The third camera may be at the same place.
-fn pose(entries: &Entries) -> Result<Pose> {
+    // It may be at the place of the left camera.
     let expected = "3 numbers, the left camera in the frame of this one";
-    let translation = entries.require(opencv::TRANSLATION, "T", expected)?;
-    // R and T in one matrix.
-    if entries.find(opencv::ROTATION).is_none() && translation.numbers::<16>(expected).is_ok() {
-        return translation.pose();
-    }
-    Ok(Pose {
-        rotation: opencv::rotation_to(entries, "this one")?,
-        translation: translation.numbers(expected)?,
-    })
+    let pose = pose::of_entries(entries, "the rotation from the left camera to this one", expected)?;
+    Ok(ThirdCamera { lens, pose, size, unit: opencv::unit(entries)? })
 }

@@ -35,6 +35,8 @@ pub mod ply;
 pub mod raster;
 #[cfg(feature = "files")]
 pub mod read;
+#[cfg(feature = "clouds")]
+pub mod read_cloud;
 #[cfg(feature = "files")]
 mod save;
 #[cfg(feature = "cameras")]
