@@ -154,7 +154,7 @@ pub use image::Pair;
 #[cfg(not(target_arch = "wasm32"))]
 pub use matcher::SharedMatcher;
 pub use matcher::on_device;
-pub use matcher::{Answer, AutoRange, Builder, Job, Matched, Matcher, Search, Timing};
+pub use matcher::{Answer, AutoRange, Builder, Frame, Job, Matched, Matcher, Search, Timing};
 pub use options::Method;
 pub use prior::Prior;
 pub use watch::Progress;

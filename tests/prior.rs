@@ -11,9 +11,11 @@ use mrfgs::low_level::backend::gpu::FaultInjection;
 use mrfgs::maps::{Maps, flag};
 use mrfgs::options::{DisparityRange, Execution, LeftRightCheck, Method};
 use mrfgs::prior::{PriorKind, PriorUse};
-use mrfgs::{Error, Matched, Matcher, Prior};
+use mrfgs::{Error, Frame, Matched, Matcher, Prior};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 const RANGE: DisparityRange = DisparityRange { min: 0, max: 47 };
 
@@ -202,4 +204,84 @@ fn a_prior_of_another_size_is_refused() {
     let error = matcher.job(&pair, RANGE).prior(prior).run().unwrap_err();
     let Error::Mismatch(reason) = error else { panic!("{error}") };
     assert!(reason.contains("50 x 40"), "{reason}");
+}
+
+/// Three frames of a scene, with different noise.
+fn frames(prior: Option<&Arc<Prior>>) -> Vec<Frame> {
+    let (pair, _) = scene("mixed");
+    let pair = pair.crop(&Rect { x: 0..160, y: 0..120 });
+    let other = scene("grain").0.crop(&Rect { x: 0..160, y: 0..120 });
+    let of = |pair: &Pair, prior: Option<&Arc<Prior>>| {
+        Frame::new(pair.clone(), RANGE).with_prior(prior.map(Arc::clone))
+    };
+    vec![of(&pair, None), of(&other, prior), of(&pair, prior)]
+}
+
+fn all(matcher: &mut Matcher, frames: Vec<Frame>) -> Vec<Matched> {
+    let mut found = Vec::new();
+    let take = |matched| {
+        found.push(matched);
+        ControlFlow::Continue(())
+    };
+    matcher.run_all(frames, take).unwrap();
+    found
+}
+
+fn following(matcher: &mut Matcher) -> Vec<Maps> {
+    let mut found = Vec::new();
+    let take = |matched: Matched| {
+        found.push(matched.maps);
+        ControlFlow::Continue(())
+    };
+    matcher.run_following(frames(None), &AtomicBool::new(false), take).unwrap();
+    found
+}
+
+#[test]
+fn frames_have_priors_of_their_own() {
+    let truth = scene("mixed").1.crop(&Rect { x: 0..160, y: 0..120 });
+    let prior = points(&truth, 7);
+    let mut method = Method::default();
+    method.set("measure-every", "1").unwrap();
+    let alone: Vec<_> = frames(Some(&prior))
+        .into_iter()
+        .map(|frame| matched(&mut cpu(), &frame.pair, &method, frame.prior.as_ref()).maps)
+        .collect();
+    let gpu = devices::open(FaultInjection::default());
+    let gpu = gpu.map(|gpu| Matcher::on(Ok(gpu), false, &Execution::default()).unwrap());
+    for mut matcher in [Some(cpu()), gpu].into_iter().flatten() {
+        matcher.set_method(method.clone());
+        let found = all(&mut matcher, frames(Some(&prior)));
+        assert_eq!(found.iter().map(|m| m.prior.is_some()).collect::<Vec<_>>(), [false, true, true]);
+        assert!(found.iter().zip(&alone).all(|(found, alone)| found.maps == *alone));
+        // Control: without the priors, the maps are others.
+        let without = all(&mut matcher, frames(None));
+        assert!(without[1].maps != alone[1] && without[2].maps != alone[2]);
+    }
+    let small = points(&truth.crop(&Rect { x: 0..50, y: 0..40 }), 5);
+    let error = cpu().run_all(frames(Some(&small)), |_| ControlFlow::Continue(())).unwrap_err();
+    assert!(error.to_string().contains("50 x 40"), "{error}");
+}
+
+#[test]
+fn what_a_frame_shows_is_known_in_the_next() {
+    let found = following(&mut cpu());
+    let plain: Vec<_> = all(&mut cpu(), frames(None)).into_iter().map(|matched| matched.maps).collect();
+    assert!(found[0] == plain[0] && found[1] != plain[1] && found[2] != plain[2]);
+    // The noise of the second frame moves fewer pixels.
+    let moved = |maps: &[Maps]| {
+        let pixels = maps[0].disparity.data().iter().zip(maps[1].disparity.data());
+        pixels.filter(|(a, b)| a.abs_diff(**b) > 256).count()
+    };
+    assert!(
+        3 * moved(&found) < 2 * moved(&plain),
+        "{} and {} of {}",
+        moved(&found),
+        moved(&plain),
+        160 * 120
+    );
+    if let Some(gpu) = devices::open(FaultInjection::default()) {
+        let mut gpu = Matcher::on(Ok(gpu), false, &Execution::default()).unwrap();
+        assert!(following(&mut gpu) == found);
+    }
 }

@@ -2,6 +2,8 @@
 
 mod check;
 mod corrections;
+mod following;
+mod frame;
 mod job;
 mod matched;
 pub mod on_device;
@@ -28,6 +30,7 @@ use crate::region::Region;
 use crate::threads::Threads;
 use crate::watch::Observer;
 use check::check;
+pub use frame::Frame;
 pub use job::{Answer, Job};
 use matched::summed;
 pub use matched::{Matched, Timing};

@@ -2,13 +2,16 @@
 
 use super::check::check;
 use super::corrections::Corrections;
-use super::{Matched, Matcher, Request};
+use super::{Frame, Matched, Matcher, Request, fits};
 use crate::backend::Backend;
 use crate::engine::{self, MatchRun};
 use crate::error::Result;
 use crate::front::conditioning::Conditioning;
+#[cfg(doc)]
 use crate::image::Pair;
-use crate::options::{DisparityRange, Method};
+#[cfg(doc)]
+use crate::options::DisparityRange;
+use crate::options::Method;
 use crate::plan::Plan;
 use crate::program::Program;
 use crate::program::tiles::Tiles;
@@ -17,7 +20,8 @@ use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 
 impl Matcher {
-    /// Matches pairs in order, each over its range, and passes each result to `take` until it breaks.
+    /// Matches pairs in order, each over its range, and passes each result to `take` until it breaks. A pair is a [`Frame`], or
+    /// a tuple of [`Pair`] and [`DisparityRange`].
     ///
     /// While a device matches one pair, the graphs of the next are built and uploaded, and the maps of the
     /// previous one are downloaded, unless a pair is cut into tiles or matched at twice its size. The CPU path
@@ -33,7 +37,7 @@ impl Matcher {
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run_all(
         &mut self,
-        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        pairs: impl IntoIterator<Item = impl Into<Frame>>,
         take: impl FnMut(Matched) -> ControlFlow<()> + Send,
     ) -> Result<()> {
         pollster::block_on(self.run_all_async(pairs, take))
@@ -46,7 +50,7 @@ impl Matcher {
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run_all_until(
         &mut self,
-        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        pairs: impl IntoIterator<Item = impl Into<Frame>>,
         cancel: &AtomicBool,
         take: impl FnMut(Matched) -> ControlFlow<()> + Send,
     ) -> Result<()> {
@@ -59,7 +63,7 @@ impl Matcher {
     /// The errors of [`Job::run_async`](super::Job::run_async), after the results of all earlier pairs.
     pub async fn run_all_async(
         &mut self,
-        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        pairs: impl IntoIterator<Item = impl Into<Frame>>,
         take: impl FnMut(Matched) -> ControlFlow<()> + Send,
     ) -> Result<()> {
         self.run_each(pairs, &AtomicBool::new(false), take).await
@@ -67,29 +71,30 @@ impl Matcher {
 
     async fn run_each(
         &mut self,
-        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        pairs: impl IntoIterator<Item = impl Into<Frame>>,
         cancel: &AtomicBool,
         mut take: impl FnMut(Matched) -> ControlFlow<()> + Send,
     ) -> Result<()> {
-        let mut pairs = pairs.into_iter().fuse();
+        let mut pairs = pairs.into_iter().map(Into::into).fuse();
         let method = &self.method.clone();
         let observer: Observer = &mut |_| goes_on([cancel]);
         let mut last: Option<Flight> = None;
         let mut corrections = Corrections::default();
         // The device may be lost during the sequence.
         while self.gpu.is_some() || self.timings || cfg!(target_arch = "wasm32") {
-            let Some((pair, range)) = pairs.next() else { break };
-            let started = self.start(&pair, range, method, &mut corrections, &mut *observer).await;
+            let Some(frame) = pairs.next() else { break };
+            let started = self.start(&frame, method, &mut corrections, &mut *observer).await;
             if let Some(last) = last.take()
                 && take(self.land(last, method, &mut *observer).await?).is_break()
             {
                 return Ok(());
             }
             match started? {
-                (known, Some((tiles, started))) => last = Some(Flight { pair, range, known, tiles, started }),
+                (known, Some((tiles, started))) => last = Some(Flight { frame, known, tiles, started }),
                 (known, None) => {
-                    let request = Request { range, method, known, prior: None };
-                    if take(self.solve(&pair, request, &mut *observer, None).await?).is_break() {
+                    let Frame { pair, range, prior } = &frame;
+                    let request = Request { range: *range, method, known, prior: prior.as_ref() };
+                    if take(self.solve(pair, request, &mut *observer, None).await?).is_break() {
                         return Ok(());
                     }
                 }
@@ -109,21 +114,23 @@ impl Matcher {
     /// between.
     async fn start(
         &mut self,
-        pair: &Pair,
-        range: DisparityRange,
+        Frame { pair, range, prior }: &Frame,
         method: &Method,
         corrections: &mut Corrections,
         observer: Observer<'_>,
     ) -> Result<(Option<Conditioning>, Option<(Tiles, MatchRun)>)> {
         let (width, height) = pair.size();
-        let plan = Plan::new(width, height, range, method)?;
+        let plan = Plan::new(width, height, *range, method)?.with_prior(prior.is_some());
+        if let Some(prior) = prior {
+            fits(prior, pair)?;
+        }
         let tiles = Tiles::new(&plan)?;
         let measured = async || corrections.of(pair, &plan, &mut *observer);
         let known = self.threads.run(width * height, measured).await??;
         let Self { threads, gpu: Some(device), checked, timings: false, .. } = self else {
             return Ok((known, None));
         };
-        let program = Program::new(&tiles)?.corrected(known);
+        let program = Program::new(&tiles)?.corrected(known).knowing(prior.clone());
         if !program.waits_once() {
             return Ok((known, None));
         }
@@ -140,7 +147,7 @@ impl Matcher {
 
     /// Completes a match that was started on the device; if the device has failed, matches again without it.
     async fn land(&mut self, flight: Flight, method: &Method, observer: Observer<'_>) -> Result<Matched> {
-        let Flight { pair, range, known, tiles, started } = flight;
+        let Flight { frame: Frame { pair, range, prior }, known, tiles, started } = flight;
         let (width, height) = pair.size();
         if let Some(device) = &mut self.gpu {
             let finished = async || engine::finish(device, started, &pair).await;
@@ -149,14 +156,14 @@ impl Matcher {
                 Err(e) => self.without_device(e)?,
             };
         }
-        self.solve(&pair, Request { range, method, known, prior: None }, observer, None).await
+        let request = Request { range, method, known, prior: prior.as_ref() };
+        self.solve(&pair, request, observer, None).await
     }
 }
 
 /// A match that was started on a device.
 struct Flight {
-    pair: Pair,
-    range: DisparityRange,
+    frame: Frame,
     known: Option<Conditioning>,
     tiles: Tiles,
     started: MatchRun,

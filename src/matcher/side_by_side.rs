@@ -4,12 +4,11 @@
 //! thread takes its own pair while enough of them wait, and otherwise helps with the rows of another.
 
 use super::corrections::Corrections;
-use super::{Matched, Matcher, timed};
+use super::{Frame, Matched, Matcher, fits, timed};
 use crate::error::{ExecutionError, Purpose, Result};
 use crate::front::conditioning::Conditioning;
-use crate::image::Pair;
 use crate::memory;
-use crate::options::{DisparityRange, Method};
+use crate::options::Method;
 use crate::plan::Plan;
 use crate::program::tiles::Tiles;
 use crate::watch::{Observer, goes_on};
@@ -20,13 +19,13 @@ use std::sync::mpsc::{Receiver, channel, sync_channel};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-/// Matches `pairs`, and passes the results to `take`, in order, until it breaks.
+/// Matches the pairs of `frames`, and passes the results to `take`, in order, until it breaks.
 ///
 /// # Errors
 /// The errors of a match, after the results of all pairs before have been passed on.
 pub(super) fn side_by_side(
     matcher: &mut Matcher,
-    pairs: impl Iterator<Item = (Pair, DisparityRange)>,
+    frames: impl Iterator<Item = Frame>,
     mut corrections: Corrections,
     cancel: &AtomicBool,
     take: impl FnMut(Matched) -> ControlFlow<()> + Send,
@@ -36,7 +35,10 @@ pub(super) fn side_by_side(
     let pool = threads.pool(usize::MAX)?;
     let room = Room::new(pool.current_num_threads(), u64::from(method.tiles.memory) << 20);
     let (cpus, stop) = (Mutex::new(cpus), AtomicBool::new(false));
-    let matched = |pair: &Pair, tiles: &Tiles, known: Option<Conditioning>, bytes: u64| {
+    let matched = |Frame { pair, prior, .. }: &Frame,
+                   tiles: &Tiles,
+                   known: Option<Conditioning>,
+                   bytes: u64| {
         let observer: Observer = &mut |_| goes_on([cancel, &stop]);
         let mut cpu = {
             let mut idle = locked(&cpus);
@@ -47,7 +49,8 @@ pub(super) fn side_by_side(
             );
             cpu
         };
-        let matched = pollster::block_on(timed(&mut cpu, false, tiles, (pair, known, None), observer, None));
+        let matched =
+            pollster::block_on(timed(&mut cpu, false, tiles, (pair, known, prior.as_ref()), observer, None));
         locked(&cpus).push(cpu);
         Ok(Matched { note: given_up.clone(), ..matched? })
     };
@@ -61,13 +64,13 @@ pub(super) fn side_by_side(
         });
         let taking = taking.map_err(|e| ExecutionError::Threads(e.to_string()))?;
         pool.in_place_scope(|scope| {
-            for (pair, range) in pairs {
-                let planned = planned(&pair, range, method);
+            for frame in frames {
+                let planned = planned(&frame, method);
                 let share = room.share(planned.as_ref().map_or(0, |(_, bytes)| *bytes));
                 // Measure here: the next frames need it, and a thread of the pool that waited for it might wait for itself.
                 let planned = planned.and_then(|(tiles, bytes)| {
                     let observer: Observer = &mut |_| goes_on([cancel, stop]);
-                    let known = pool.install(|| corrections.of(&pair, tiles.whole(), observer))?;
+                    let known = pool.install(|| corrections.of(&frame.pair, tiles.whole(), observer))?;
                     Ok((tiles, known, bytes))
                 });
                 let (answer, answered) = sync_channel(1);
@@ -76,8 +79,9 @@ pub(super) fn side_by_side(
                     break;
                 }
                 scope.spawn(move |_| {
-                    let _ = answer
-                        .send(planned.and_then(|(tiles, known, bytes)| matched(&pair, &tiles, known, bytes)));
+                    let _ = answer.send(
+                        planned.and_then(|(tiles, known, bytes)| matched(&frame, &tiles, known, bytes)),
+                    );
                     drop(share);
                 });
             }
@@ -91,9 +95,12 @@ pub(super) fn side_by_side(
 }
 
 /// The tiles of a match, and the most bytes that it needs.
-fn planned(pair: &Pair, range: DisparityRange, method: &Method) -> Result<(Tiles, u64)> {
+fn planned(Frame { pair, range, prior }: &Frame, method: &Method) -> Result<(Tiles, u64)> {
     let (width, height) = pair.size();
-    let plan = Plan::new(width, height, range, method)?;
+    let plan = Plan::new(width, height, *range, method)?.with_prior(prior.is_some());
+    if let Some(prior) = prior {
+        fits(prior, pair)?;
+    }
     let tiles = Tiles::new(&plan)?;
     let doubled = plan.doubled()?.map(|double| Tiles::new(&double)).transpose()?;
     let bytes = tiles.bytes().max(doubled.map_or(0, |tiles| tiles.bytes()));
