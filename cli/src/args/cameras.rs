@@ -4,6 +4,14 @@ use std::str::FromStr;
 
 use mrfgs::image::calib::{Calibration, Camera, Unit};
 
+/// What needs the cameras.
+pub(crate) struct CameraNeed {
+    /// Its name in messages, a flag.
+    pub(crate) flag: String,
+    /// Whether it needs the unit of the baseline.
+    pub(crate) unit: bool,
+}
+
 /// Flags that give the cameras of a rectified pair in place of a calibration file.
 #[derive(clap::Args, Clone, Copy)]
 pub(crate) struct CameraArgs {

@@ -11,11 +11,11 @@ mod region;
 pub(crate) mod search;
 mod sign;
 
-pub(crate) use cameras::{CameraArgs, above_zero};
+pub(crate) use cameras::{CameraArgs, CameraNeed, above_zero};
 pub(crate) use execution::{ExecutionArgs, ThreadArgs};
 pub(crate) use method::MethodArgs;
-pub use prior::Kind as PriorKind;
-pub(crate) use prior::{PriorArgs, PriorFile};
+pub use prior::{Kind as PriorKind, LengthUnit};
+pub(crate) use prior::{PriorArgs, PriorFile, PriorNames, PriorView};
 pub(crate) use reading::{ReadingArgs, disparity, scale};
 pub(crate) use recording::{RecordingArgs, Topics};
 pub(crate) use rectification::{RectificationArgs, shown};

@@ -5,13 +5,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::ValueEnum;
-use mrfgs::image::read;
+use mrfgs::calibration::pose;
+use mrfgs::depth::Rig;
+use mrfgs::error::ReadError;
+use mrfgs::image::read::Reader;
+use mrfgs::image::{Plane, read_cloud};
 use mrfgs::low_level::text;
 use mrfgs::prior::{PriorKind, PriorPoint};
 use mrfgs::{Error, Prior};
 use serde::Serialize;
 
-use crate::args::Sign;
+use crate::args::{CameraNeed, Sign};
 use crate::failure::{Failure, Result};
 
 /// Largest list of points, in bytes.
@@ -27,14 +31,41 @@ pub enum Kind {
     Surface,
 }
 
-/// The prior of a match.
-#[derive(clap::Args)]
+/// A unit of lengths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LengthUnit {
+    /// Millimetres
+    Mm,
+    /// Centimetres
+    Cm,
+    /// Metres
+    M,
+}
+
+impl LengthUnit {
+    fn millimetres(self) -> f64 {
+        match self {
+            Self::Mm => 1.0,
+            Self::Cm => 10.0,
+            Self::M => 1000.0,
+        }
+    }
+}
+
+/// What is known before a match.
+#[derive(clap::Args, Clone)]
 #[command(next_help_heading = "What is known of the scene")]
 pub(crate) struct PriorArgs {
     /// Disparities of LEFT that are known: points of a lidar or of a bundle adjustment, a terrain model, the map of the last frame
     ///
-    /// Either a disparity map of the size of LEFT (PFM, TIFF, PNG as in KITTI, NPY; 0 of a PNG, infinity and NaN are unknown), or a .csv or
-    /// .txt file with a line `x,y,disparity` or `x,y,disparity,sigma` for each point, in pixels. With --rectify, they belong to the rectified view.
+    /// - A disparity map of LEFT (PFM, TIFF, PNG as in KITTI, NPY; 0 of a PNG, infinity and NaN are unknown), also of another size.
+    /// - A depth map of LEFT, with --prior-unit.
+    /// - A .csv or .txt file with a line `x,y,disparity` or `x,y,disparity,sigma` for each point, in pixels.
+    /// - A point cloud: .ply, .pcd, .las, .laz, .xyz (text), .bin (KITTI), or COLMAP's points3D.txt. It needs a calibration. Points are in
+    ///   the frame of the left camera (x right, y down, z forward; with --rectify, as it took LEFT), or moved there by --prior-pose.
+    ///
+    /// With --rectify, maps and lists belong to the rectified view.
     #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
     /// Standard deviation of the known disparities, in pixels [default: 0.25 for points, 1 for surfaces]
@@ -43,7 +74,32 @@ pub(crate) struct PriorArgs {
     /// How to use them [default: points where at most a fifth of the pixels are known]
     #[arg(long, value_enum, value_name = "KIND", requires = "prior")]
     prior_kind: Option<Kind>,
+    /// Unit of the file. A map with a unit holds depths, and a list x,y,depth [default: pixels of disparity; for a point cloud the unit of
+    /// the baseline]
+    #[arg(long, value_enum, value_name = "UNIT", requires = "prior")]
+    prior_unit: Option<LengthUnit>,
+    /// Where a point cloud comes from: the rotation and translation that take its points into the frame of the left camera
+    ///
+    /// A text with 12 or 16 numbers, the rows of [R T]; entries R and T in YAML, JSON or as in KITTI's calib_velo_to_cam.txt; KITTI's
+    /// Tr_velo_to_cam or Tr; or COLMAP's images.txt, whose first image is the left one.
+    #[arg(long, value_name = "FILE", requires = "prior")]
+    prior_pose: Option<PathBuf>,
 }
+
+/// The view that a prior is for.
+#[derive(Clone, Copy)]
+pub(crate) struct PriorView {
+    /// Width and height of the left view in pixels.
+    pub(crate) size: (usize, usize),
+    /// The user's sign of disparities.
+    pub(crate) sign: Sign,
+    /// The cameras, with points in the frame of the left camera that took the image.
+    pub(crate) rig: Option<Rig>,
+}
+
+/// The flags of a prior, for messages.
+const FLAGS: PriorNames =
+    PriorNames { file: "--prior", kind: "--prior-kind", unit: "--prior-unit", pose: "--prior-pose" };
 
 impl PriorArgs {
     /// The file, if there is one.
@@ -51,32 +107,90 @@ impl PriorArgs {
         self.prior.as_deref()
     }
 
-    /// Reads the prior for a left view of (width, height) pixels, with disparities by `sign`.
-    pub(crate) fn read(&self, size: (usize, usize), sign: Sign) -> Result<Option<Arc<Prior>>> {
-        let Self { prior_sigma: sigma, prior_kind: kind, .. } = *self;
-        if let Some(sigma) = sigma.filter(|sigma| !(*sigma > 0.0 && sigma.is_finite())) {
+    /// The files that no output may overwrite, each with its name.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        let files = [("the file of --prior", &self.prior), ("the file of --prior-pose", &self.prior_pose)];
+        files.into_iter().filter_map(|(name, file)| Some((name, file.as_deref()?)))
+    }
+
+    /// Why the cameras are needed, if they are.
+    pub(crate) fn need(&self) -> Option<CameraNeed> {
+        self.file().and_then(|path| self.need_of(path))
+    }
+
+    /// Why the cameras are needed for a file that is read as the flags say, if they are.
+    pub(crate) fn need_of(&self, path: &Path) -> Option<CameraNeed> {
+        self.at(path).need()
+    }
+
+    /// Reads the prior for a view.
+    pub(crate) fn read(&self, view: PriorView) -> Result<Option<Arc<Prior>>> {
+        self.file().map(|path| self.read_file(path, view)).transpose()
+    }
+
+    /// Reads a file as the flags say, whatever file they name.
+    pub(crate) fn read_file(&self, path: &Path, view: PriorView) -> Result<Arc<Prior>> {
+        if let Some(sigma) = self.prior_sigma.filter(|sigma| !(*sigma > 0.0 && sigma.is_finite())) {
             return Err(Failure::usage("--prior-sigma", format!("{sigma} is not above 0")));
         }
-        let names = ["--prior", "--prior-kind"];
-        let file = self.file().map(|path| PriorFile { path, sigma, kind, names });
-        file.map(|file| file.read(size, sign)).transpose()
+        self.at(path).read(view)
+    }
+
+    fn at<'a>(&'a self, path: &'a Path) -> PriorFile<'a> {
+        let &Self { prior_sigma: sigma, prior_kind: kind, prior_unit: unit, .. } = self;
+        PriorFile { path, sigma, kind, unit, pose: self.prior_pose.as_deref(), names: FLAGS }
     }
 }
 
+/// The flags or columns of a prior, for messages.
+#[derive(Clone, Copy)]
+pub(crate) struct PriorNames {
+    pub(crate) file: &'static str,
+    pub(crate) kind: &'static str,
+    pub(crate) unit: &'static str,
+    pub(crate) pose: &'static str,
+}
+
 /// A file of known disparities, and how to use it.
+#[derive(Clone, Copy)]
 pub(crate) struct PriorFile<'a> {
     pub(crate) path: &'a Path,
     /// Standard deviation in pixels, above 0; `None` for the usual one.
     pub(crate) sigma: Option<f64>,
     pub(crate) kind: Option<Kind>,
-    /// The flags or columns that name the file and its kind, for messages.
-    pub(crate) names: [&'static str; 2],
+    /// The unit of lengths in the file.
+    pub(crate) unit: Option<LengthUnit>,
+    /// The pose of a point cloud.
+    pub(crate) pose: Option<&'a Path>,
+    pub(crate) names: PriorNames,
 }
 
 impl PriorFile<'_> {
-    /// Reads the prior for a left view of (width, height) pixels, with disparities by `sign`.
-    pub(crate) fn read(&self, size: (usize, usize), sign: Sign) -> Result<Arc<Prior>> {
-        let prior = if is_list(self.path) { self.listed(size, sign) } else { self.map(size, sign) };
+    /// Why the cameras are needed, if they are.
+    pub(crate) fn need(&self) -> Option<CameraNeed> {
+        let with_unit = self.unit.is_some();
+        let flag = if with_unit { self.names.unit } else { self.names.file };
+        (with_unit || is_cloud(self.path)).then(|| CameraNeed { flag: flag.into(), unit: with_unit })
+    }
+
+    /// Reads the prior for a view, whose cameras must be known if they are needed.
+    pub(crate) fn read(&self, view: PriorView) -> Result<Arc<Prior>> {
+        let is_cloud = is_cloud(self.path);
+        if self.pose.is_some() && !is_cloud {
+            let reason =
+                format!("only applies to a point cloud, which {} is not; remove it", self.path.display());
+            return Err(Failure::usage(self.names.pose, reason));
+        }
+        if self.kind() == Some(PriorKind::Surface) && (is_cloud || is_list(self.path)) {
+            let reason = format!("{} holds points; give a map for a surface", self.path.display());
+            return Err(Failure::usage(self.names.kind, reason));
+        }
+        let prior = match view.rig {
+            Some(rig) if is_cloud => self.cloud(view, &rig),
+            None if is_cloud => Err(self.refused(" is a point cloud, which needs a calibration; add one")),
+            _ if is_list(self.path) => self.listed(view),
+            _ => self.map(view),
+        };
         prior.map(Arc::new)
     }
 
@@ -94,7 +208,7 @@ impl PriorFile<'_> {
 
     /// A failure that names the file; `reason` follows directly, with its punctuation.
     fn refused(&self, reason: impl Display) -> Failure {
-        Failure::usage(self.names[0], format!("{}{reason}", self.path.display()))
+        Failure::usage(self.names.file, format!("{}{reason}", self.path.display()))
     }
 
     /// The failure of the library to take what the file holds.
@@ -105,38 +219,106 @@ impl PriorFile<'_> {
         }
     }
 
-    fn map(&self, size: (usize, usize), sign: Sign) -> Result<Prior> {
-        let map = sign.map(read::read_disparity(self.path)?);
-        if map.size() != size {
-            let ((w, h), (width, height)) = (map.size(), size);
-            let reason = format!(" has {w} x {h} pixels, LEFT {width} x {height}; give a map of LEFT");
-            return Err(self.refused(reason));
-        }
-        let kind = self.kind().unwrap_or_else(|| PriorKind::of_map(&map));
-        Prior::map(kind, &map, self.sigma_of(kind)).map_err(|e| self.of_library(e))
+    /// The baselines' units in a unit of the file.
+    fn scale(&self, rig: &Rig) -> f64 {
+        let lengths = self.unit.map(LengthUnit::millimetres).zip(rig.unit().millimetres());
+        lengths.map_or(1.0, |(own, theirs)| own / theirs)
     }
 
-    fn listed(&self, size: (usize, usize), sign: Sign) -> Result<Prior> {
-        let path = self.path;
-        if self.kind() == Some(PriorKind::Surface) {
-            let reason = format!("{} holds points; give a map for a surface", path.display());
-            return Err(Failure::usage(self.names[1], reason));
+    /// The points of a cloud that the left view sees.
+    fn cloud(&self, view: PriorView, rig: &Rig) -> Result<Prior> {
+        let pose = self.pose.map(pose::read).transpose()?;
+        let scale = self.scale(rig);
+        let points = read_cloud::positions(self.path)?.into_iter();
+        let points = points.map(|point| pose.map_or(point, |pose| pose.moved(point)).map(|v| v * scale));
+        Prior::scene(rig, view.size, points, self.sigma_of(PriorKind::Points)).map_err(|e| self.of_library(e))
+    }
+
+    /// A value of the file, a disparity or with a unit a depth, as a disparity; not finite if it is none.
+    fn disparity(&self, value: f64, view: PriorView) -> f64 {
+        match view.rig.filter(|_| self.unit.is_some()) {
+            Some(rig) if value > 0.0 && value.is_finite() => rig.disparity(value * self.scale(&rig)),
+            Some(_) => f64::INFINITY,
+            None if view.sign == Sign::default() => value,
+            None => -value,
         }
-        let text = text::read(path, MOST_BYTES, "a list of points")?;
-        let text = str::from_utf8(&text).map_err(|_| self.refused(" is not UTF-8 text"))?;
-        let points = PriorPoint::listed(text, self.sigma).map_err(|e| self.of_library(e))?;
-        let signed = |point: PriorPoint| {
-            let disparity = if sign == Sign::default() { point.disparity } else { -point.disparity };
-            PriorPoint { disparity, ..point }
+    }
+
+    fn map(&self, view: PriorView) -> Result<Prior> {
+        let reader = Reader::default();
+        let map = match self.unit {
+            None => reader.disparity(self.path),
+            // Whole numbers count the unit.
+            Some(_) => match reader.scaled_disparity(self.path, 1.0) {
+                Err(Error::Read { cause: ReadError::NeedlessScale, .. }) => reader.disparity(self.path),
+                read => read,
+            },
+        }?;
+        let map = map.map(|&value| {
+            let value = f64::from(value);
+            if value.is_finite() { self.disparity(value, view) as f32 } else { f32::INFINITY }
+        });
+        let kind = self.kind().unwrap_or_else(|| PriorKind::of_map(&map));
+        let sigma = self.sigma_of(kind);
+        let prior = if map.size() == view.size {
+            Prior::map(kind, &map, sigma)
+        } else {
+            let ((w, h), (width, height)) = (map.size(), view.size);
+            // Of the same shape, within a pixel of the smaller one.
+            if (w * height).abs_diff(h * width) > width.max(height) {
+                let reason = format!(
+                    " has {w} x {h} pixels, LEFT {width} x {height}; give a map of LEFT, or of the same shape in another size"
+                );
+                return Err(self.refused(reason));
+            }
+            let stretch = if self.unit.is_some() { 1.0 } else { width as f32 / w as f32 };
+            resized(kind, &map.map(|d| d * stretch), view.size, sigma)
         };
-        Prior::points(size, points.into_iter().map(signed)).map_err(|e| self.of_library(e))
+        prior.map_err(|e| self.of_library(e))
+    }
+
+    fn listed(&self, view: PriorView) -> Result<Prior> {
+        let text = text::read(self.path, MOST_BYTES, "a list of points")?;
+        let text = str::from_utf8(&text).map_err(|_| self.refused(" is not UTF-8 text"))?;
+        let points = PriorPoint::listed(text, self.sigma).map_err(|e| self.of_library(e))?.into_iter();
+        let points =
+            points.map(|point| PriorPoint { disparity: self.disparity(point.disparity, view), ..point });
+        Prior::points(view.size, points).map_err(|e| self.of_library(e))
     }
 }
 
-/// Whether a file holds a list of points.
+/// A map of another size as a prior of a view. The value of a pixel counts in all of its area, or of points in the middle of it.
+fn resized(kind: PriorKind, map: &Plane<f32>, size: (usize, usize), sigma: f64) -> mrfgs::Result<Prior> {
+    let ((w, h), (width, height)) = (map.size(), size);
+    if kind == PriorKind::Surface {
+        let of = |x: usize, y: usize| map[((2 * x + 1) * w / (2 * width), (2 * y + 1) * h / (2 * height))];
+        return Prior::map(kind, &Plane::from_fn(width, height, of), sigma);
+    }
+    let middle = |i: usize, own: usize, count: usize| (i as f64 + 0.5) * own as f64 / count as f64 - 0.5;
+    let all = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).filter(|at| map[*at].is_finite());
+    let point = |(x, y): (usize, usize)| PriorPoint {
+        x: middle(x, width, w),
+        y: middle(y, height, h),
+        disparity: map[(x, y)].into(),
+        sigma,
+    };
+    Prior::points(size, all.map(point))
+}
+
+/// Whether a file holds a list of points in the left view.
 fn is_list(path: &Path) -> bool {
+    ends_in(path, &["csv", "txt"]) && !is_cloud(path)
+}
+
+/// Whether a file holds points of the scene.
+fn is_cloud(path: &Path) -> bool {
+    let is_of_colmap = path.file_name().is_some_and(|name| name.eq_ignore_ascii_case("points3D.txt"));
+    is_of_colmap || ends_in(path, &["ply", "pcd", "las", "laz", "xyz", "bin"])
+}
+
+fn ends_in(path: &Path, ends: &[&str]) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    ["csv", "txt"].iter().any(|list| extension.eq_ignore_ascii_case(list))
+    ends.iter().any(|end| extension.eq_ignore_ascii_case(end))
 }
 
 #[cfg(test)]
@@ -148,12 +330,23 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();
-        (folder, PriorArgs { prior: Some(path), prior_sigma: sigma, prior_kind: None })
+        let args = PriorArgs {
+            prior: Some(path),
+            prior_sigma: sigma,
+            prior_kind: None,
+            prior_unit: None,
+            prior_pose: None,
+        };
+        (folder, args)
+    }
+
+    fn view(sign: Sign) -> PriorView {
+        PriorView { size: (8, 6), sign, rig: None }
     }
 
     fn points(text: &str, sign: Sign) -> std::result::Result<Arc<Prior>, String> {
         let (_folder, args) = given("points.csv", text, None);
-        args.read((8, 6), sign).map(Option::unwrap).map_err(|e| e.to_string())
+        args.read(view(sign)).map(Option::unwrap).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -171,6 +364,6 @@ mod tests {
         assert!(points("90,2,3\n", LeftMinusRight).unwrap_err().contains("none of the 1 points"));
         assert!(points("1,2,3,-1\n", LeftMinusRight).unwrap_err().contains("-1 px"));
         let (_folder, args) = given("points.csv", "1,2,3", Some(-1.0));
-        assert!(args.read((8, 6), LeftMinusRight).unwrap_err().to_string().contains("--prior-sigma"));
+        assert!(args.read(view(LeftMinusRight)).unwrap_err().to_string().contains("--prior-sigma"));
     }
 }

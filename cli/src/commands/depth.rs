@@ -102,8 +102,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let (path, calibration) = calibration(args, map.size())?;
     let known = (path.as_deref().unwrap_or(input::NUMBERS.as_ref()), &calibration);
     let takes_unit = also.iter().find(|word| word.takes_unit()).or(also.first());
-    let rig =
-        takes_unit.map(|word| input::rig(word, Some(known), &args.map, map.size(), "give one with --calib"));
+    let rig = takes_unit
+        .map(|word| input::rig(&word.need(), Some(known), &args.map, map.size(), "give one with --calib"));
     let rig = rig.transpose()?;
     let behind = rig.as_ref().map(|rig| behind(args, &map, rig)).transpose()?.flatten();
     if !args.quiet {

@@ -8,6 +8,7 @@ use mrfgs::image::{Plane, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
 
+use crate::args::CameraNeed;
 use crate::failure::{Failure, Result};
 use crate::outputs::messages;
 use crate::outputs::outcome::{Of, View};
@@ -157,6 +158,11 @@ impl Also {
     /// Whether it needs the unit of the baseline.
     pub(crate) fn takes_unit(&self) -> bool {
         matches!(self.kind, Kind::Millimetres | Kind::Registered { millimetres: true })
+    }
+
+    /// What it needs the cameras for.
+    pub(crate) fn need(&self) -> CameraNeed {
+        CameraNeed { flag: self.flag(), unit: self.takes_unit() }
     }
 
     /// Refuses to publish it in ROS if the unit of the baseline of `rig` is unknown.

@@ -13,11 +13,11 @@ use mrfgs::rectification::{Doubt, Options, Rectification, Trust};
 use mrfgs::region::Region;
 use mrfgs::{Error, Matched};
 
-use crate::args::{CameraArgs, CropArgs, ReadingArgs, ResolvedRange, Search, Sign, shown};
+use crate::args::{CameraArgs, CameraNeed, CropArgs, ReadingArgs, ResolvedRange, Search, Sign, shown};
 use crate::console;
 use crate::failure::{self, Failure, Result};
 use crate::matching::SearchSpace;
-use crate::outputs::{Also, Files};
+use crate::outputs::Files;
 use crate::pairs::folder::CALIBRATION;
 use crate::pairs::list;
 use crate::remedy;
@@ -262,10 +262,10 @@ impl Input {
         })
     }
 
-    /// The cameras for the output `word`, if there is one; `left` is the path of the left image.
-    pub(crate) fn rig(&self, word: Option<&Also>, left: &Path) -> Result<Option<Rig>> {
+    /// The cameras, if something needs them; `left` is the path of the left image.
+    pub(crate) fn rig(&self, need: Option<&CameraNeed>, left: &Path) -> Result<Option<Rig>> {
         if let Some(known) = self.calibration.as_ref().filter(|known| known.is_of_flags()) {
-            let Some(word) = word else {
+            let Some(need) = need else {
                 if self.by_depth {
                     return Ok(None);
                 }
@@ -273,13 +273,13 @@ impl Input {
                     "is only used for depth and points; add --also depth or --also points, or remove it";
                 return Err(Failure::usage("--focal", reason));
             };
-            if word.takes_unit() && known.calibration.unit.millimetres().is_none() {
+            if need.unit && known.calibration.unit.millimetres().is_none() {
                 let reason = "needs the unit of the baseline; add it: --baseline 120mm, 12cm or 0.12m";
-                return Err(Failure::usage(word.flag(), reason));
+                return Err(Failure::usage(&need.flag, reason));
             }
         }
         let known = self.calibration.as_ref().map(KnownCalibration::named);
-        let found = word.map(|word| rig(word, known, left, self.pair.size(), self.remedy)).transpose()?;
+        let found = need.map(|need| rig(need, known, left, self.pair.size(), self.remedy)).transpose()?;
         Ok(match self.rectifying() {
             Some(rectifying) => found.map(|rig| rig.rectified_by(&rectifying)),
             None => found,
@@ -289,6 +289,14 @@ impl Input {
     /// The rotation from the left camera's frame to the rectified frame, if the pair was rectified.
     pub(crate) fn rectifying(&self) -> Option<Matrix> {
         self.rectification.as_ref().map(|by| by.rotations()[0])
+    }
+
+    /// The cameras with points in the frame of the left camera as it took the image, even if the pair was rectified.
+    pub(crate) fn as_taken(&self, rig: Option<Rig>) -> Option<Rig> {
+        match self.rectifying() {
+            Some(rectifying) => rig.map(|rig| rig.in_original_frame(&rectifying)),
+            None => rig,
+        }
     }
 
     /// Whether sparse matches have found the range.
@@ -515,12 +523,12 @@ pub(crate) fn rectify_alone(
     Ok((by, pair))
 }
 
-/// The cameras for the output `word`, from the `calibration` of the pair, whose left image is `left` and has this size.
+/// The cameras for what needs them, from the `calibration` of the pair, whose left image is `left` and has this size.
 ///
 /// # Errors
 /// If there is no calibration, or it is for another size or lacks values that depth needs; `remedy` says how to give one.
 pub(crate) fn rig(
-    word: &Also,
+    need: &CameraNeed,
     calibration: Option<(&Path, &Calibration)>,
     left: &Path,
     (width, height): (usize, usize),
@@ -529,7 +537,7 @@ pub(crate) fn rig(
     let Some((path, calibration)) = calibration else {
         let reason =
             format!("needs camera values, but there is no calib.txt beside {}; {remedy}", left.display());
-        return Err(Failure::usage(word.flag(), reason));
+        return Err(Failure::usage(&need.flag, reason));
     };
     let size = (calibration.width.unwrap_or(width as u32), calibration.height.unwrap_or(height as u32));
     if size != (width as u32, height as u32) {
@@ -544,12 +552,12 @@ pub(crate) fn rig(
         .into());
     }
     let rig = Rig::new(calibration).map_err(|e| failure::in_file(e, path, ""))?;
-    if word.takes_unit() && rig.unit().millimetres().is_none() {
+    if need.unit && rig.unit().millimetres().is_none() {
         let reason = format!(
             "{} lacks the unit of the baseline; add an entry `unit` to it: mm, cm or m",
             path.display()
         );
-        return Err(Failure::usage(word.flag(), reason));
+        return Err(Failure::usage(&need.flag, reason));
     }
     Ok(rig)
 }

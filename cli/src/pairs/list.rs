@@ -1,7 +1,7 @@
 //! Lists of pairs: CSV files in UTF-8 whose header names the columns.
 //!
-//! Columns are name, left and right, and optionally `max_disparity`, `min_disparity`, mask, calibration, prior, `prior_sigma` and
-//! `prior_kind`. An empty field counts as missing. Empty lines and lines starting with # are skipped.
+//! Columns are name, left and right, and optionally `max_disparity`, `min_disparity`, mask, calibration, prior, `prior_sigma`,
+//! `prior_kind`, `prior_unit` and `prior_pose`. An empty field counts as missing. Empty lines and lines starting with # are skipped.
 
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -14,14 +14,14 @@ use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
 use serde::Serialize;
 
-pub use crate::args::PriorKind;
 use crate::args::above_zero;
 pub use crate::args::search::{Largest, pixels};
+pub use crate::args::{LengthUnit, PriorKind};
 use crate::outputs::also;
 use crate::remedy;
 
 /// The columns of a list; the first three are required.
-pub(crate) const COLUMNS: [&str; 10] = [
+pub(crate) const COLUMNS: [&str; 12] = [
     "name",
     "left",
     "right",
@@ -32,7 +32,11 @@ pub(crate) const COLUMNS: [&str; 10] = [
     "prior",
     "prior_sigma",
     "prior_kind",
+    "prior_unit",
+    "prior_pose",
 ];
+/// Columns that say how to use a prior.
+const OF_PRIOR: [&str; 4] = ["prior_sigma", "prior_kind", "prior_unit", "prior_pose"];
 const REQUIRED: usize = 3;
 
 /// The longest name of a pair in bytes, short enough to leave room for the endings of its files.
@@ -73,6 +77,12 @@ pub struct PriorRow {
     /// Whether the known disparities count as points or as a surface, if the row says so.
     #[serde(rename = "prior_kind")]
     pub kind: Option<PriorKind>,
+    /// The unit of lengths in the file, if given.
+    #[serde(rename = "prior_unit")]
+    pub unit: Option<LengthUnit>,
+    /// Path of the file with the pose of its points, as written in the list, if given.
+    #[serde(skip)]
+    pub pose: Option<String>,
 }
 
 /// Reads a list, which may have no rows.
@@ -151,13 +161,16 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
         Some(file) => {
             let sigma = field("prior_sigma").map(sigma).transpose();
             let kind = field("prior_kind").map(|kind| PriorKind::from_str(kind, false)).transpose();
+            let unit = field("prior_unit").map(|unit| LengthUnit::from_str(unit, false)).transpose();
             Some(PriorRow {
                 file: file.to_owned(),
                 sigma: sigma.map_err(|reason| within("prior_sigma", reason))?,
                 kind: kind.map_err(|_| within("prior_kind", "must be points or surface".to_owned()))?,
+                unit: unit.map_err(|_| within("prior_unit", "must be mm, cm or m".to_owned()))?,
+                pose: field("prior_pose").map(str::to_owned),
             })
         }
-        None => match ["prior_sigma", "prior_kind"].into_iter().find(|column| field(column).is_some()) {
+        None => match OF_PRIOR.into_iter().find(|column| field(column).is_some()) {
             Some(column) => {
                 return Err(within(column, "there is no prior; fill that column, too".to_owned()));
             }

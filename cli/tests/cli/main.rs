@@ -26,6 +26,7 @@ mod matching;
 mod outputs;
 mod plugin;
 mod points;
+mod priors;
 mod recordings;
 mod registered;
 #[path = "../../../testdata/render-cloud.rs"]

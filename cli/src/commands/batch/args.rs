@@ -27,8 +27,8 @@ A list:
 /// Match many pairs, and resume an interrupted run
 ///
 /// LIST is a CSV file whose header names the columns: name, left, right, and optionally `max_disparity`, `min_disparity`, mask,
-/// calibration, prior, `prior_sigma` and `prior_kind`, which correspond to flags of `mrfgs match`; separate several calibration files with
-/// a semicolon. An empty field means no value; without a range, that of the calibration is searched, else one estimated from the images.
+/// calibration, prior, `prior_sigma`, `prior_kind`, `prior_unit` and `prior_pose`, which correspond to flags of `mrfgs match`; separate
+/// several calibration files with a semicolon. An empty field means no value; without a range, that of the calibration is searched, else one estimated from the images.
 /// Relative paths start at the folder of LIST; lines starting with # are comments. LIST may also be a folder: each visible folder in it is
 /// a pair, in one of the layouts of `mrfgs evaluate`; without a calib.txt the range is that of the ground truth.
 ///

@@ -9,12 +9,16 @@ use mrfgs::image::read::Reader;
 use mrfgs::rectification::Options;
 use mrfgs::{Error, Prior};
 
-use crate::args::{CropArgs, PriorFile, Search, Sign};
+use crate::args::{CropArgs, PriorFile, PriorNames, PriorView, Search, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, Files};
 use crate::pairs::folder::{self, CALIBRATION, Folder};
 use crate::pairs::input;
 use crate::pairs::list::{self, Names, PriorRow, Row};
+
+/// The columns of a prior, for messages.
+const PRIOR_COLUMNS: PriorNames =
+    PriorNames { file: "prior", kind: "prior_kind", unit: "prior_unit", pose: "prior_pose" };
 
 /// A list of pairs.
 pub(super) struct List {
@@ -107,7 +111,8 @@ impl Listed {
     pub(super) fn inputs(&self, base: &Path, given: &BatchSettings) -> Vec<String> {
         let inputs = match &self.source {
             Source::Row(Row { left, right, mask, calibration, max_disparity, prior, .. }) => {
-                let takes_calibration = given.cameras.is_some() || max_disparity.is_none();
+                let need = prior.as_ref().and_then(|row| prior_file(row, row.file.as_ref(), None).need());
+                let takes_calibration = given.cameras.is_some() || max_disparity.is_none() || need.is_some();
                 let beside = Some(calibration_beside(left))
                     .filter(|_| takes_calibration && calibration.is_empty() && given.calib.is_empty());
                 [left]
@@ -116,6 +121,7 @@ impl Listed {
                     .chain(mask)
                     .chain(calibration)
                     .chain(prior.as_ref().map(|prior| &prior.file))
+                    .chain(prior.as_ref().and_then(|prior| prior.pose.as_ref()))
                     .cloned()
                     .chain(beside)
                     .collect()
@@ -187,7 +193,12 @@ impl Listed {
             return Err(Failure::usage("--rectify", reason));
         }
         let left_image = at(&left);
-        let beside = Some(&*left_image).filter(|_| given.cameras.is_some() || search.takes_calibration());
+        let pose = self.prior().and_then(|prior| prior.pose.as_ref()).map(at);
+        let prior_path = self.prior().map(|prior| at(&prior.file));
+        let prior = self.prior().zip(prior_path.as_deref());
+        let prior = prior.map(|(row, path)| prior_file(row, path, pose.as_deref()));
+        let need = given.cameras.map(Also::need).or_else(|| prior.as_ref().and_then(PriorFile::need));
+        let beside = Some(&*left_image).filter(|_| need.is_some() || search.takes_calibration());
         let input = input::Input::new(
             pair,
             &search,
@@ -197,19 +208,16 @@ impl Listed {
             given.rectify.as_ref(),
             beside,
         )?;
-        let rig = input.rig(given.cameras, &left_image)?;
+        let known = input.rig(need.as_ref(), &left_image)?;
+        let rig = known.filter(|_| given.cameras.is_some());
         let calibration = match &self.source {
             Source::Row(row) if self.has_calibration() => Some(row.calibration.join(", ")),
             _ if !calib.is_empty() => input.calibration_files(),
             Source::Row(_) => input.calibration_files().map(|_| calibration_beside(&left)),
             Source::Folder => Some(calibration_beside(&left)).filter(|path| at(path).exists()),
         };
-        let prior = self.prior().map(|PriorRow { file, sigma, kind }| {
-            let names = ["prior", "prior_kind"];
-            let file = PriorFile { path: &at(file), sigma: *sigma, kind: *kind, names };
-            file.read(input.pair.size(), Sign::default())
-        });
-        let prior = prior.transpose()?;
+        let view = PriorView { size: input.pair.size(), sign: Sign::default(), rig: input.as_taken(known) };
+        let prior = prior.map(|prior| prior.read(view)).transpose()?;
         let prior_file = self.prior().map(|prior| prior.file.clone());
         let files = Files { left, right, mask, calibration, prior: prior_file, output: None };
         Ok(LoadedPair { input, rig, prior, files })
@@ -220,6 +228,12 @@ impl Listed {
         let names = Folder::to_match(dir)?.view_names();
         Ok(names.map(|file| shown(&Path::new(&self.name).join(file))))
     }
+}
+
+/// The prior of a row, whose files are at these paths.
+fn prior_file<'a>(row: &PriorRow, path: &'a Path, pose: Option<&'a Path>) -> PriorFile<'a> {
+    let &PriorRow { sigma, kind, unit, .. } = row;
+    PriorFile { path, sigma, kind, unit, pose, names: PRIOR_COLUMNS }
 }
 
 pub(super) fn shown(path: &Path) -> String {

@@ -453,6 +453,8 @@ mod tests {
             "min_disparity" => "-3",
             "prior_sigma" => "2",
             "prior_kind" => "surface",
+            "prior_unit" => "cm",
+            "prior_pose" => "two.yml",
             other => panic!("{other} is not in the table"),
         };
         let of = |changed: &str| {
@@ -461,7 +463,7 @@ mod tests {
                 "name" => "a",
                 "left" => "left.png",
                 "right" => "right.png",
-                // Sigma and kind belong to a prior.
+                // The columns after it belong to a prior.
                 "prior" => "other.png",
                 _ => "",
             });

@@ -8,7 +8,9 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
 use mrfgs::sigma::Sigma;
 
-use crate::args::{CameraArgs, ExecutionArgs, MethodArgs, PriorArgs, RectificationArgs, RegionArgs, Sign};
+use crate::args::{
+    CameraArgs, ExecutionArgs, MethodArgs, PriorArgs, PriorView, RectificationArgs, RegionArgs, Sign,
+};
 use crate::failure::{Failure, Result};
 use crate::outputs::{
     Also, AlsoArgs, Files, InFront, MatchRecord, Outcome, View, Written, files, other_sign,
@@ -41,6 +43,8 @@ Examples:
   mrfgs match photo.mpo d.pfm --rectify
   # With points of a lidar in the left view, as lines of x,y,disparity:
   mrfgs match l.png r.png d.pfm --max-disparity 90 --prior points.csv
+  # With the points of a lidar, and where it stands:
+  mrfgs match l.png r.png d.pfm --calib calib.txt --prior scan.pcd --prior-pose lidar.txt
   # Points as LAZ, in the frame of the left camera before rectification:
   mrfgs match l.png r.png d.pfm --rectify --calib c --also points-original.laz";
 
@@ -130,20 +134,23 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     let rectifying = args.rectification.options_if(args.rectify)?;
     args.also.check(args.rectify)?;
     let third = args.also.third()?;
+    let need = cameras.map(Also::need).or_else(|| args.prior.need());
     if args.rectify && args.pair.calib.is_empty() {
-        let flag = cameras.map(Also::flag).or(args.numbers.flag().map(str::to_owned));
+        let flag = need.as_ref().map(|need| need.flag.clone());
+        let flag = flag.or(args.numbers.flag().map(str::to_owned));
         if let Some(flag) = flag {
             let reason = "without a calibration there is no scale and so no depth; add --calib FILE";
             return Err(Failure::usage(flag, reason));
         }
     }
-    let read = || args.pair.read(args.sign, cameras.is_some(), Some(&args.numbers), rectifying.as_ref());
+    let read = || args.pair.read(args.sign, need.is_some(), Some(&args.numbers), rectifying.as_ref());
     let input = stop::at_once(read)?;
     let range = input.range;
     if !args.quiet {
         input.say_range(args.sign, "");
     }
-    let mut rig = input.rig(cameras, &args.pair.left)?;
+    let known = input.rig(need.as_ref(), &args.pair.left)?;
+    let mut rig = known.filter(|_| cameras.is_some());
     let part = args.region.roi.as_ref();
     let region = part.map(|part| input.region(part)).transpose()?;
     let also = check_outputs(args, &input)?;
@@ -151,7 +158,8 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
         input.warn(region.as_ref());
     }
     let (width, height) = region.as_ref().map_or(input.pair.size(), |region| region.window().size());
-    let prior = args.prior.read(input.pair.size(), args.sign)?;
+    let view = PriorView { size: input.pair.size(), sign: args.sign, rig: input.as_taken(known) };
+    let prior = args.prior.read(view)?;
     let plan = Plan::new(width, height, range, &method)?.with_prior(prior.is_some());
     if args.dry_run {
         return Ok(console::print(&plan::describe(&plan)?)?);
@@ -230,7 +238,7 @@ fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathB
     let also: Vec<_> = args.also.wanted().map(|word| (word, word.beside(output))).collect();
     files::check_json_path(args.json.as_deref())?;
     let mut inputs = args.pair.inputs(input);
-    inputs.extend(args.prior.file().map(|path| ("the file of --prior", path)));
+    inputs.extend(args.prior.inputs());
     inputs.extend(args.method.files().map(|path| ("the file of --method", path)));
     inputs.extend(args.also.into.as_deref().map(|path| ("the file of --into", path)));
     let flags: Vec<_> = also.iter().map(|(word, path)| (word.flag(), path.as_path())).collect();

@@ -17,7 +17,7 @@ use mrfgs_ros::messages::{CameraInfo, Encoding, Header};
 use crate::args::Sign;
 use crate::failure::{Failure, Result};
 use crate::outputs::messages::{self, Messages, Sink};
-use crate::outputs::{Cameras, Outcome};
+use crate::outputs::{Also, Cameras, Outcome};
 use crate::pairs::input::{Calib, Input};
 use crate::sequences::{Rectifier, ros};
 use crate::{console, remedy, stop};
@@ -182,8 +182,8 @@ impl<'a> Matching<'a> {
             input.warn(None);
         }
         let word = args.also.take_cameras();
-        let rig = match word {
-            Some(_) => input.rig(word, Path::new(self.cameras.image(0)))?,
+        let rig = match word.map(Also::need) {
+            Some(need) => input.rig(Some(&need), Path::new(self.cameras.image(0)))?,
             None => None,
         };
         if let (Some(word), Some(rig)) = (word, &rig) {

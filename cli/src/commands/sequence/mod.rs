@@ -1,6 +1,7 @@
 //! `mrfgs sequence`.
 
 mod kind;
+mod known;
 mod pipeline;
 mod writer;
 
@@ -17,18 +18,19 @@ use mrfgs::steady::Steady;
 use mrfgs::{Error, Matcher};
 
 use crate::args::{
-    CameraArgs, CropArgs, ExecutionArgs, MethodArgs, ReadingArgs, RecordingArgs, RectificationArgs,
-    RegionArgs, Search, Sign,
+    CameraArgs, CropArgs, ExecutionArgs, MethodArgs, PriorArgs, PriorView, ReadingArgs, RecordingArgs,
+    RectificationArgs, RegionArgs, Search, Sign,
 };
 use crate::failure::{Failure, Result};
 use crate::outputs::messages::Messages;
-use crate::outputs::{Cameras, Files, MapArgs, files, is_printed};
+use crate::outputs::{Also, Cameras, Files, MapArgs, files, is_printed};
 use crate::pairs::folder::CALIBRATION;
 use crate::pairs::input::{Calib, Input};
 use crate::sequences::{FramePair, Frames, Layout, Pairing, RawFrames, Recorded, Rectifier, raw_frames};
 use crate::{console, ffmpeg, plan, stop};
 
 use kind::Kind;
+use known::FramePriors;
 use pipeline::Pipeline;
 use writer::{Records, Writer};
 
@@ -46,8 +48,19 @@ Examples:
   mrfgs sequence drive.mcap found.mcap --also depth,points
   # Shown live in Foxglove:
   mrfgs sequence drive.mcap ws://localhost:8765 --also depth,points
+  # With the scans of a lidar, one per frame, and where it stands:
+  mrfgs sequence left right maps --calib c.yml --prior scans --prior-pose lidar.txt
+  # Cameras that stand still:
+  mrfgs sequence left.mp4 right.mp4 disparity.mp4 --prior last
   # Raw images and a calibration, with depth in millimetres:
   mrfgs sequence left right maps --rectify --calib c.yml --also depth-mm";
+
+/// The flag `--prior` of sequences.
+const PRIOR: &str = "Disparities that are known: a file for all frames, a folder with a file per frame, or `last` for the frame before";
+const PRIORS: &str = "\
+A file of a folder belongs to the frame that has its name, up to the extension; frames without a file have no prior. Files are as for `mrfgs \
+match`. With `last`, the disparities measured in a frame are known in the next: for cameras that stand still, whose maps then flicker less. \
+Frames are then matched one after another.";
 
 /// Match the frames of a video
 ///
@@ -72,6 +85,7 @@ Examples:
 /// Ctrl-C, the maps of all earlier frames are complete.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_missing_positional = true)]
+#[command(mut_arg("prior", |arg| arg.help(PRIOR).long_help(format!("{PRIOR}\n\n{PRIORS}"))))]
 #[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
 pub(crate) struct Args {
     /// Frames of the left camera, or frames with both views
@@ -113,6 +127,8 @@ pub(crate) struct Args {
     rectify: bool,
     #[command(flatten)]
     rectification: RectificationArgs,
+    #[command(flatten)]
+    prior: PriorArgs,
     /// Steadies still surfaces: where the image does not change, disparities are averaged with earlier frames, weighted by confidence.
     /// Confidence, validity, raw and the right view's map are not averaged
     #[arg(long)]
@@ -151,7 +167,7 @@ impl Args {
             right: path(self.right.as_deref().unwrap_or(&self.left)),
             mask: self.mask.as_deref().map(path),
             calibration: input.calibration_files(),
-            prior: None,
+            prior: self.prior.file().map(path),
             output: Some(path(&self.output)),
         }
     }
@@ -202,9 +218,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         first.ok_or_else(|| Error::read(&args.left, "contains no frame"))??;
     let sign = Sign::default();
     let cameras = args.maps.also.take_cameras();
+    let prior_need = known::need(&args.prior)?;
+    let takes_rig = takes_cameras(args) || prior_need.is_some();
     let beside = first_image
         .as_deref()
-        .filter(|_| takes_cameras(args) || kind.takes_messages() || args.search.takes_calibration());
+        .filter(|_| takes_rig || kind.takes_messages() || args.search.takes_calibration());
     let numbers = Some(&args.numbers);
     let calib = texts.as_deref().map_or(Calib::Files(&args.calib, &args.crop), Calib::Texts);
     let mut input = Input::new(pair, &args.search, sign, calib, numbers, rectifying.as_ref(), beside)?;
@@ -219,11 +237,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         input.say_range(sign, " of the first frame");
     }
     // Messages with cameras and --recalibrate use a calibration if there is one, but do not require all of it.
-    let mut rig = if cameras.is_none() && (kind.takes_messages() || args.recalibrate) {
+    let need = cameras.map(Also::need).or(prior_need);
+    let known = if need.is_none() && (kind.takes_messages() || args.recalibrate) {
         None
     } else {
-        input.rig(cameras, first_image.as_deref().unwrap_or(&args.left))?
+        input.rig(need.as_ref(), first_image.as_deref().unwrap_or(&args.left))?
     };
+    let mut rig = known.filter(|_| cameras.is_some());
     if let (Some(word), Some(rig)) = (cameras.filter(|_| kind.takes_messages()), &rig) {
         word.check_metres(rig)?;
     }
@@ -235,9 +255,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if !args.quiet {
         input.warn(region.as_ref());
     }
+    let view = PriorView { size: input.pair.size(), sign, rig: input.as_taken(known) };
+    let window = region.as_ref().map(|region| region.window().clone());
+    let priors = FramePriors::new(&args.prior, view, window)?;
     if args.dry_run {
         let (width, height) = region.as_ref().map_or(input.pair.size(), |region| region.window().size());
-        let plan = Plan::new(width, height, input.range, &method)?;
+        let plan = Plan::new(width, height, input.range, &method)?.with_prior(args.prior.file().is_some());
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
     let sigma = Sigma::for_method(&method);
@@ -272,7 +295,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let known = input.calibration().and_then(|known| Rectification::of_rectified(known, size).ok());
     let rectifier = Rectifier::new(input.rectification, known, range, recalibrate);
     let first = FramePair { name, header, pair: input.pair };
-    let ended = pipeline.run(first, frames, rectifier, &mut sink);
+    let ended = pipeline.run(first, frames, rectifier, priors, &mut sink);
     if !args.quiet {
         for (film, complaint) in &films {
             if let Some(said) = complaint.said() {
@@ -445,6 +468,7 @@ fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Re
     let beside = first_image.map(|image| image.with_file_name(CALIBRATION));
     let given = args.mask.iter().chain(&args.calib).chain(&args.maps.also.into).chain(&beside);
     inputs.extend(given.map(PathBuf::as_path));
+    inputs.extend(args.prior.inputs().map(|(_, path)| path).filter(|path| path.is_file()));
     let named: Vec<_> = inputs.iter().map(|file| ("an input", *file)).collect();
     files::check_json_path(args.json.as_deref())?;
     if let Some(json) = files::json_file(args.json.as_deref()) {

@@ -1,16 +1,17 @@
 //! Reading, matching and writing at the same time.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use mrfgs::Matcher;
 use mrfgs::check::Warning;
 use mrfgs::drift::Turn;
 use mrfgs::image::Pair;
 use mrfgs::options::DisparityRange;
 use mrfgs::region::Region;
+use mrfgs::{Frame, Matched, Matcher, Prior};
 use serde::Serialize;
 
 use crate::args::Sign;
@@ -22,6 +23,7 @@ use crate::sequences::{FramePair, Frames, Rectifier, turned};
 use crate::text::plural;
 use crate::{console, remedy, stop};
 
+use super::known::FramePriors;
 use super::writer::{MatchedFrame, Sink};
 
 /// Frames queued between two steps, enough to keep both busy.
@@ -50,11 +52,20 @@ struct WriterNeeds {
     record: bool,
 }
 
-/// A rectified frame with the turn of the right camera so far, or the error that ended the frames.
-type NextFrame = Result<(FramePair, Option<Turn>)>;
+/// A rectified frame, or the error that ended the frames.
+type NextFrame = Result<ReadyFrame>;
+
+/// A rectified frame.
+struct ReadyFrame {
+    frame: FramePair,
+    /// The turn of the right camera so far.
+    turn: Option<Turn>,
+    prior: Option<Arc<Prior>>,
+}
 
 impl Pipeline {
-    /// Matches `first`, which is already rectified, and all `frames`, which `rectifier` rectifies, and writes the results.
+    /// Matches `first`, which is already rectified, and all `frames`, which `rectifier` rectifies, each with its prior, and writes the
+    /// results.
     ///
     /// # Errors
     /// Errors of reading, matching and writing, and a stop by the user. Earlier results are written in any case.
@@ -63,6 +74,7 @@ impl Pipeline {
         first: FramePair,
         frames: Frames,
         mut rectifier: Rectifier,
+        priors: FramePriors,
         sink: &mut Sink,
     ) -> Result<()> {
         let start = Instant::now();
@@ -72,13 +84,16 @@ impl Pipeline {
         let mut bar = Counter::of_frames(frames.len(), self.quiet);
         let (sender, receiver) = sync_channel(WAITING);
         let turn = rectifier.followed(&first.pair)?;
+        let prior = priors.of(&first.name)?;
+        let follow = priors.follow();
         let told = first.pair.doubts().each_ref().map(|doubt| self.quiet || doubt.is_some());
         // Not joined, as it may wait for standard input forever.
-        thread::spawn(move || read(frames, rectifier, told, &sender));
+        thread::spawn(move || read(frames, rectifier, &priors, told, &sender));
         let (found, to_write) = sync_channel::<MatchedFrame>(WAITING);
         let (matched, written) = thread::scope(|scope| {
             let writing = scope.spawn(|| write(to_write, sink, &mut bar));
-            let matched = self.matched((first, turn), &receiver, takes, start, found);
+            let first = ReadyFrame { frame: first, turn, prior };
+            let matched = self.matched(first, follow, &receiver, takes, start, found);
             (matched, writing.join())
         });
         drop(bar);
@@ -110,10 +125,11 @@ impl Pipeline {
         })
     }
 
-    /// Matches all frames and passes the results on.
+    /// Matches all frames, which may `follow` from each other, and passes the results on.
     fn matched(
         &mut self,
-        first: (FramePair, Option<Turn>),
+        first: ReadyFrame,
+        follow: bool,
         frames: &Receiver<NextFrame>,
         takes: WriterNeeds,
         start: Instant,
@@ -132,7 +148,7 @@ impl Pipeline {
         let mut failure = None;
         let mut next = Some(Ok(first));
         let pairs = std::iter::from_fn(|| {
-            let (frame, turn) =
+            let ReadyFrame { frame, turn, prior } =
                 match next.take().map_or_else(|| received(frames).map(Result::flatten), Some)? {
                     Ok(frame) => frame,
                     Err(error) => {
@@ -144,17 +160,28 @@ impl Pipeline {
             let (part, window) = narrowed(frame.pair);
             let about = (frame.name, frame.header, turn);
             let _ = started.send((about, part.georeferences(), takes.pair.then_some(part)));
-            Some((window, range))
+            Some(Frame::new(window, range).with_prior(prior))
         });
         let mut ran = MatchingOutcome { on: None, note: None, turn: None, ended: Ok(()) };
         let told = &mut ran;
-        let ended = matcher.run_all_until(pairs, stop::flag(), move |mut matched| {
+        let mut doubted = self.quiet;
+        let take = move |mut matched: Matched| {
             let Ok(((name, header, turn), georeferences, pair)) = under_way.try_recv() else {
                 return ControlFlow::Break(());
             };
             let note = matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS));
             told.note = note.or(told.note.take());
             told.turn = turn.or(told.turn);
+            // Once, as it may hold for all frames.
+            let is_doubt = |warning: &Warning| matches!(warning, Warning::Contradicted { .. });
+            if !doubted
+                && !follow
+                && matched.prior.is_some()
+                && let Some(doubt) = matched.warnings().into_iter().find(is_doubt)
+            {
+                doubted = true;
+                console::say(&format!("warning: frame {name}: {}", remedy::warning(&doubt, &remedy::FLAGS)));
+            }
             if let Some(region) = region {
                 matched.maps = region.maps_of(&matched.maps);
             }
@@ -170,7 +197,12 @@ impl Pipeline {
                 // The writer reports the cause when it is joined.
                 Err(_) => ControlFlow::Break(()),
             }
-        });
+        };
+        let ended = if follow {
+            matcher.run_following(pairs, stop::flag(), take)
+        } else {
+            matcher.run_all_until(pairs, stop::flag(), take)
+        };
         ran.ended = match (ended, failure) {
             (Err(error), _) => Err(error.into()),
             (Ok(()), Some(failure)) => Err(failure),
@@ -237,7 +269,13 @@ fn received<T>(from: &Receiver<T>) -> Option<Result<T>> {
 
 /// Reads and rectifies frames until one fails or the receiver is gone. Warns of the first damaged image of each camera, unless it has been
 /// `told`.
-fn read(frames: Frames, mut rectifier: Rectifier, mut told: [bool; 2], to: &SyncSender<NextFrame>) {
+fn read(
+    frames: Frames,
+    mut rectifier: Rectifier,
+    priors: &FramePriors,
+    mut told: [bool; 2],
+    to: &SyncSender<NextFrame>,
+) {
     for frame in frames {
         let doubts = frame.iter().flat_map(|frame| frame.pair.doubts().iter().enumerate());
         for (side, doubt) in doubts {
@@ -247,7 +285,8 @@ fn read(frames: Frames, mut rectifier: Rectifier, mut told: [bool; 2], to: &Sync
         }
         let rectified = |FramePair { name, header, pair }: FramePair| {
             let (pair, turn) = rectifier.rectified(pair)?;
-            Ok((FramePair { name, header, pair }, turn))
+            let prior = priors.of(&name)?;
+            Ok(ReadyFrame { frame: FramePair { name, header, pair }, turn, prior })
         };
         let frame = frame.map_err(Failure::from).and_then(rectified);
         let failed = frame.is_err();
