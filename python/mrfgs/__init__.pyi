@@ -126,11 +126,12 @@ class Matcher:
         """Matches a rectified pair, and returns its maps; help(mrfgs.Matcher) explains every argument."""
     def match_all(
         self,
-        pairs: Iterable[Sequence[_Image]],
+        pairs: Iterable[Sequence[_Image | Mapping[str, Any] | None]],
         max_disparity: float | None = None,
         *,
         min_disparity: float | None = None,
         no_data: float | None = None,
+        prior: Literal["last"] | None = None,
         method: _Path | None = None,
         options: Mapping[str, Any] | None = None,
         memory: str | None = None,
@@ -138,7 +139,9 @@ class Matcher:
     ) -> MatchedSequence:
         """Matches pair after pair, and returns an iterator over their results, in order. At most three pairs are consumed ahead of the
         results; an exception from `pairs` comes after the results of earlier pairs. The pairs are frames of one pair of cameras, unless
-        options={"measure-every": 1}."""
+        options={"measure-every": 1}. A pair is (left, right) or (left, right, prior); its prior is an array as for `match`, a dict of the
+        arguments `prior`, `prior_sigma` and `prior_kind` of `match`, or None. With prior="last" each frame without one takes what was
+        measured in the frame before, for cameras that stand still."""
 
 @final
 class MatchedSequence(Iterator[Matched]):
@@ -268,6 +271,9 @@ class Rig:
         """Like `registered`, in whole millimetres: 0 if unknown or above 65535."""
     def points(self, matched: Matched, left: _Image) -> Points:
         """The points of measured, trusted pixels (validity 0), with the colours of the rectified left image."""
+    def seen(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Where the left image shows points of the scene, as the `prior` of `match`: rows x, y and disparity in pixels, of shape (N, 3), NaN
+        for points behind the cameras. `points` has shape (N, 3), in the frame and unit of Points.positions."""
     @property
     def cameras(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         """The matrices [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] of the left and the right camera, in pixels."""

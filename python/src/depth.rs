@@ -7,6 +7,7 @@ use mrfgs::depth::Rig;
 use mrfgs::image::calib::{Calibration, Camera, Unit};
 use mrfgs::image::cloud::{Cloud, Point};
 use mrfgs::image::{Pair, Plane, write};
+use mrfgs::options::MAX_DISPARITY;
 use mrfgs::rectification::Doubt;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -112,6 +113,18 @@ impl PyRig {
         let map = arrays::disparities("disparity", disparity)?;
         self.check("disparity", map.size())?;
         Ok(map)
+    }
+}
+
+/// The positions of points, x, y, z one after the other.
+fn positions(name: &str, given: &Bound<PyAny>) -> PyResult<Vec<f64>> {
+    const EXPECTED: &str = "shape (N, 3), float32 or float64";
+    match arrays::table::<f64>(name, given, Some(3), EXPECTED) {
+        Err(error) if error.is_instance_of::<PyTypeError>(given.py()) => {
+            let singles = arrays::table::<f32>(name, given, Some(3), EXPECTED)?;
+            Ok(singles.into_iter().map(f64::from).collect())
+        }
+        doubles => doubles,
     }
 }
 
@@ -288,6 +301,21 @@ impl PyRig {
         PyPoints::of(py, &cloud.points, cloud.unit)
     }
 
+    /// Where the left image shows points of the scene, such as those of a lidar: float64 of shape (N, 3) with rows x, y and disparity in
+    /// pixels, which `match` takes as its prior. NaN for points that are not in front of the cameras, or too near for any match. Positions
+    /// may be outside the image.
+    ///
+    /// points: array (N, 3) of float32 or float64, in the frame and the unit of `points`. With a Rectification, points @
+    ///     rectification.rotations[0].T turns those in the frame of the camera that took the left image.
+    fn seen<'py>(&self, py: Python<'py>, points: &Bound<PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let points = positions("points", points)?;
+        let can_match = |seen: &[f64; 3]| seen[2].abs() <= f64::from(MAX_DISPARITY);
+        let seen = |point: &[f64; 3]| self.rig.seen(*point).filter(can_match).unwrap_or([f64::NAN; 3]);
+        let seen = points.as_chunks::<3>().0.iter().map(seen);
+        let seen: Vec<f64> = seen.flatten().collect();
+        seen.into_pyarray(py).reshape([points.len() / 3, 3])
+    }
+
     /// The matrices [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] of the left and the right camera: two float64 arrays (3, 3), in pixels.
     #[getter]
     fn cameras<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
@@ -385,12 +413,8 @@ impl PyPoints {
         confidence: &Bound<PyAny>,
         unit: &str,
     ) -> PyResult<Self> {
-        const EXPECTED: &str = "shape (N, 3), float32 or float64";
-        let doubles = arrays::table::<f64>("positions", positions, Some(3), EXPECTED);
-        let positions = match doubles {
-            Ok(doubles) => doubles.into_iter().map(|v| v as f32).collect(),
-            Err(_) => arrays::table::<f32>("positions", positions, Some(3), EXPECTED)?,
-        };
+        let positions: Vec<f32> =
+            self::positions("positions", positions)?.into_iter().map(|v| v as f32).collect();
         let colours = arrays::table::<u8>("colours", colours, Some(3), "shape (N, 3), uint8")?;
         let confidence = arrays::table::<u8>("confidence", confidence, None, "shape (N,), uint8")?;
         let counts = [positions.len() / 3, colours.len() / 3, confidence.len()];

@@ -19,7 +19,7 @@ use crate::arrays::{self, Image};
 use crate::exceptions::{self, exception};
 use crate::matched::PyMatched;
 use crate::sequence::{PATIENCE, PyMatchedSequence, Settings, Shared};
-use crate::{options, range};
+use crate::{options, prior, range};
 
 /// Matches pairs, keeping the device, its compiled shaders and its buffers in between.
 ///
@@ -89,7 +89,8 @@ impl PyMatcher {
     /// roi: (x, y, width, height) of a region of the left image in pixels; only that is matched, in proportionally less time, and the maps
     ///     have its size. Rig.of_part gives its depths and points.
     /// prior: disparities of the left image that are known: an array of its shape, +inf or NaN where nothing is known, or points as an array
-    ///     of shape (n, 3) or (n, 4) with rows x, y, disparity and perhaps their standard deviation, all in pixels.
+    ///     of shape (n, 3) or (n, 4) with rows x, y, disparity and perhaps their standard deviation, all in pixels. Points with +inf or NaN
+    ///     before it are left out. Rig.seen gives such rows for points of the scene.
     /// prior_sigma: the standard deviation of the prior in pixels, for all or as an array of the shape of the image; by default 0.25 for
     ///     points and 1 for surfaces.
     /// prior_kind: "points" are exact but sparse: they are cleaned and spread, and decide where no match can be trusted. A "surface" is
@@ -136,7 +137,7 @@ impl PyMatcher {
         let pair = arrays::pair(&left, &right, mask, no_data)?;
         let min_disparity = range::pixels("min_disparity", min_disparity)?;
         let given = range::given(range::pixels("max_disparity", max_disparity)?, min_disparity)?;
-        let prior = crate::prior::prior(pair.size(), prior, prior_sigma, prior_kind)?;
+        let prior = prior::prior(pair.size(), prior, prior_sigma, prior_kind)?;
         let matcher = &self.shared.matcher;
         let range = range::searched(py, matcher, &pair, given, min_disparity)?;
         let part = roi.map(|roi| region(roi, &pair, range)).transpose()?;
@@ -175,7 +176,10 @@ impl PyMatcher {
     ///
     /// pairs: an iterable of pairs (left, right) of arrays as for `match`, such as a list, a generator, or map(rectification.apply, lefts,
     ///     rights). Up to three pairs are in flight, so a result appears after two more pairs have been consumed. The arrays of a pair may
-    ///     be reused for the next one.
+    ///     be reused for the next one. A third item is the prior of the pair: an array as for `match`, None, or a dict with the arguments
+    ///     `prior`, `prior_sigma` and `prior_kind` of `match`.
+    /// prior: "last", for cameras that stand still: the disparities measured in each frame are the prior of the next, unless that has one
+    ///     of its own, so that maps flicker less. Frames then wait for each other.
     ///
     /// The pairs are frames of one pair of cameras. The automatic range and the warnings come from the first pair, and from the first one of
     /// another size. What is corrected in a pair (rows, focus, noise) is measured on every 30th. For pairs of different cameras or scenes
@@ -185,7 +189,8 @@ impl PyMatcher {
     /// raised, in the thread that asks for results. An exception from `pairs`, or about an invalid pair, comes after the results of earlier
     /// pairs; messages number pairs from 0. Ctrl-C ends the sequence, as does `close()` of the iterator, which is automatic once nothing
     /// refers to it. Until then the Matcher raises RuntimeError for other matches.
-    #[pyo3(signature = (pairs, max_disparity=None, *, min_disparity=None, no_data=None, method=None, options=None, memory=None, warn=true))]
+    #[pyo3(signature = (pairs, max_disparity=None, *, min_disparity=None, no_data=None, prior=None, method=None, options=None, memory=None,
+                        warn=true))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn match_all(
         &self,
@@ -193,18 +198,20 @@ impl PyMatcher {
         max_disparity: Option<&Bound<PyAny>>,
         min_disparity: Option<&Bound<PyAny>>,
         no_data: Option<f64>,
+        prior: Option<&Bound<PyAny>>,
         method: Option<&Bound<PyAny>>,
         options: Option<&Bound<PyAny>>,
         memory: Option<&Bound<PyAny>>,
         warn: bool,
     ) -> PyResult<PyMatchedSequence> {
+        let follow = prior::follows(prior)?;
         let method = options::method(method, options, memory)?;
         let min_disparity = range::pixels("min_disparity", min_disparity)?;
         let range = range::given(range::pixels("max_disparity", max_disparity)?, min_disparity)?;
         let pairs = pairs.try_iter().map_err(|_| {
             PyTypeError::new_err("pairs: give an iterable of pairs of arrays, such as zip(lefts, rights)")
         })?;
-        let settings = Settings { method, range, min_disparity, no_data, warn };
+        let settings = Settings { method, range, min_disparity, no_data, follow, warn };
         Ok(PyMatchedSequence::new(self.shared.clone(), settings, pairs))
     }
 }

@@ -1,5 +1,6 @@
 //! Matching of sequences: an iterator of pairs in, an iterator of results out, keeping the device busy.
 
+use std::ops::ControlFlow;
 use std::process;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
@@ -10,7 +11,7 @@ use std::time::Duration;
 use mrfgs::image::Pair;
 use mrfgs::low_level::process::Own;
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::{Error, Matched, SharedMatcher, check};
+use mrfgs::{Error, Frame, Matched, SharedMatcher, check};
 use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
@@ -18,7 +19,7 @@ use pyo3::types::PyIterator;
 use crate::arrays::{self, Image};
 use crate::exceptions::{self, exception};
 use crate::matched::PyMatched;
-use crate::range;
+use crate::{prior, range};
 
 /// Interval at which a wait checks for Ctrl-C.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(50);
@@ -51,6 +52,8 @@ pub(crate) struct Settings {
     pub(crate) range: Option<DisparityRange>,
     pub(crate) min_disparity: Option<i32>,
     pub(crate) no_data: Option<f64>,
+    /// Whether the maps of each frame are known in the next.
+    pub(crate) follow: bool,
     pub(crate) warn: bool,
 }
 
@@ -132,15 +135,15 @@ impl State {
         }
         if self.worker.is_none() {
             self.shared.check()?;
-            self.worker = Some(Own::new(Worker::new(&self.shared, &self.settings.method)));
+            self.worker = Some(Own::new(Worker::new(&self.shared, &self.settings)));
         }
         self.worker()?;
         while self.pairs.is_some() && self.counts[0] - self.counts[1] < AHEAD {
             match self.take(py) {
-                Ok(Some(job)) => {
+                Ok(Some(frame)) => {
                     self.counts[0] += 1;
                     // The error of an ended worker is raised below.
-                    if !self.worker()?.send(job) {
+                    if !self.worker()?.send(frame) {
                         self.pairs = None;
                     }
                 }
@@ -181,37 +184,43 @@ impl State {
         self.worker.as_ref().and_then(Own::get).ok_or_else(of_parent)
     }
 
-    /// The next pair and its range.
-    fn take(&mut self, py: Python) -> PyResult<Option<(Pair, DisparityRange)>> {
+    /// The next pair, with its range and its prior.
+    fn take(&mut self, py: Python) -> PyResult<Option<Frame>> {
         let Some(item) = self.pairs.as_ref().and_then(|pairs| pairs.bind(py).clone().next()) else {
             return Ok(None);
         };
         let item = item?;
-        self.job(&item).map(Some).map_err(|error| numbered(py, self.counts[0], error))
+        self.frame(&item).map(Some).map_err(|error| numbered(py, self.counts[0], error))
+    }
+
+    fn frame(&mut self, item: &Bound<PyAny>) -> PyResult<Frame> {
+        let count = item.len().ok().filter(|count| [2, 3].contains(count));
+        let one = |i: usize| count.and_then(|_| item.get_item(i).ok());
+        let Some((left, right)) = one(0).zip(one(1)) else {
+            return Err(PyTypeError::new_err("give two arrays, left and right, or these and a prior"));
+        };
+        let [left, right] = Image::both(&left, &right)?;
+        let pair = arrays::pair(&left, &right, None, self.settings.no_data)?;
+        let prior = one(2).map(|given| prior::of_pair(pair.size(), &given)).transpose()?.flatten();
+        let range = self.range(item.py(), &pair)?;
+        Ok(Frame::new(pair, range).with_prior(prior))
     }
 
     /// Finds the range and checks for likely faults, unless the last pair of the same cameras has shown both.
-    fn job(&mut self, item: &Bound<PyAny>) -> PyResult<(Pair, DisparityRange)> {
-        let py = item.py();
-        let Settings { ref method, range: given, min_disparity, no_data, warn } = self.settings;
-        let one = |i: usize| item.get_item(i).ok().filter(|_| item.len().is_ok_and(|count| count == 2));
-        let Some((left, right)) = one(0).zip(one(1)) else {
-            return Err(PyTypeError::new_err("give two arrays, left and right"));
-        };
-        let [left, right] = Image::both(&left, &right)?;
-        let pair = arrays::pair(&left, &right, None, no_data)?;
+    fn range(&mut self, py: Python, pair: &Pair) -> PyResult<DisparityRange> {
+        let Settings { ref method, range: given, min_disparity, warn, .. } = self.settings;
         let matcher = &self.shared.matcher;
         let is_alike = |(size, _): &((usize, usize), DisparityRange)| *size == pair.size();
         if let Some((_, range)) = self.last.filter(is_alike).filter(|_| method.front.measure_every > 1) {
-            return Ok((pair, range));
+            return Ok(range);
         }
-        let found = range::searched(py, matcher, &pair, given, min_disparity)?;
+        let found = range::searched(py, matcher, pair, given, min_disparity)?;
         if warn {
-            let checked = py.detach(|| matcher.share(&pair, || check::warnings(&pair, given)));
+            let checked = py.detach(|| matcher.share(pair, || check::warnings(pair, given)));
             exceptions::warn(py, checked.map_err(exception)?)?;
         }
         self.last = Some((pair.size(), found));
-        Ok((pair, found))
+        Ok(found)
     }
 
     fn end(&mut self, py: Python) {
@@ -241,7 +250,7 @@ fn numbered(py: Python, index: usize, error: PyErr) -> PyErr {
 
 /// A thread that matches the pairs it receives.
 struct Worker {
-    pairs: Option<SyncSender<(Pair, DisparityRange)>>,
+    pairs: Option<SyncSender<Frame>>,
     results: Receiver<Matched>,
     thread: Option<JoinHandle<mrfgs::Result<()>>>,
     stop: Arc<AtomicBool>,
@@ -249,27 +258,33 @@ struct Worker {
 }
 
 impl Worker {
-    fn new(shared: &Shared, method: &Method) -> Self {
+    fn new(shared: &Shared, settings: &Settings) -> Self {
         let (pairs, asked) = mpsc::sync_channel(AHEAD);
         let (found, results) = mpsc::channel();
         let (stop, taken) = (Arc::new(AtomicBool::new(false)), Arc::clone(&shared.taken));
         taken.store(process::id(), Ordering::Release);
-        let (matcher, method, told) = (Arc::clone(&shared.matcher), method.clone(), Arc::clone(&stop));
+        let (matcher, told) = (Arc::clone(&shared.matcher), Arc::clone(&stop));
+        let (method, follow) = (settings.method.clone(), settings.follow);
         let thread = thread::spawn(move || {
             matcher.turn(|matcher| {
                 matcher.set_method(method);
-                matcher.run_all_until(asked, &told, |matched| match found.send(matched) {
-                    Ok(()) => std::ops::ControlFlow::Continue(()),
-                    Err(_) => std::ops::ControlFlow::Break(()),
-                })
+                let take = |matched| match found.send(matched) {
+                    Ok(()) => ControlFlow::Continue(()),
+                    Err(_) => ControlFlow::Break(()),
+                };
+                if follow {
+                    matcher.run_following(asked, &told, take)
+                } else {
+                    matcher.run_all_until(asked, &told, take)
+                }
             })
         });
         Self { pairs: Some(pairs), results, thread: Some(thread), stop, taken }
     }
 
     /// Sends a pair, and returns whether the worker took it; there is always room, so it does unless it has ended.
-    fn send(&self, job: (Pair, DisparityRange)) -> bool {
-        self.pairs.as_ref().is_some_and(|pairs| pairs.send(job).is_ok())
+    fn send(&self, frame: Frame) -> bool {
+        self.pairs.as_ref().is_some_and(|pairs| pairs.send(frame).is_ok())
     }
 
     /// The result of the ended worker.

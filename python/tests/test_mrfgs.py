@@ -1356,6 +1356,38 @@ class Depth(Folder):
         self.assertFalse(np.array_equal(mrfgs.Rig.of(701, 120, size=(80, 60)).depth(found.disparity), rig.depth(found.disparity)))
         self.refused(ValueError, "Rig.of: lacks the unit of the baseline", lambda: other.millimetres(found.disparity))
 
+    def test_points_of_the_scene_are_a_prior(self):
+        left, right = pair()
+        # The middle rows are plain, and so say nothing of themselves.
+        left[20:40], right[20:40] = 128, 128
+        rig = mrfgs.Rig.of(100, 2, size=(80, 60), doffs=1)
+        rows, columns = (grid.ravel() for grid in np.mgrid[2:60:6, 2:80:6])
+        disparities = np.where(rows < 30, 4.0, 9.0)
+        z = 200 / (disparities + 1)
+        points = np.column_stack([(columns - 39.5) * z / 100, (rows - 29.5) * z / 100, z])
+        seen = rig.seen(points)
+        self.assertEqual((seen.dtype, seen.shape), (np.float64, points.shape))
+        self.assertLess(np.abs(seen - np.column_stack([columns, rows, disparities])).max(), 1e-9)
+        self.assertLess(np.abs(rig.seen(points.astype(np.float32)) - seen).max(), 1e-3)
+        # Those behind the cameras, at their centre or just before it are not seen, and do not count.
+        hidden = np.array([[0, 0, -3], [0, 0, 0], [0, 0, 1e-9], [np.nan, 0, 1]])
+        self.assertTrue(np.isnan(rig.seen(hidden)).all())
+        found = mrfgs.match(left, right, 15, device="cpu", prior=rig.seen(np.vstack([hidden, points])))
+        rounded = mrfgs.match(left, right, 15, device="cpu", prior=np.round(seen))
+        self.assertTrue(np.array_equal(found.disparity, rounded.disparity))
+        # Control.
+        self.assertFalse(np.array_equal(found.disparity, mrfgs.match(left, right, 15, device="cpu").disparity))
+        self.refused(ValueError, "prior: none of the 4 points has", lambda: mrfgs.match(left, right, 15, device="cpu", prior=rig.seen(hidden)))
+        self.refused(TypeError, "points: give an array of shape", lambda: rig.seen([[1, 2, 3]]))
+        self.refused(ValueError, "points: give an array of shape", lambda: rig.seen(points[:, :2]))
+        # They are in the frame of Points.positions, also after a rectification.
+        rectification = mrfgs.Rectification(CAMERAS)
+        views = rectification.apply(*raw_pair())
+        matched = mrfgs.match(*views, 31, device="cpu")
+        rows, columns = np.nonzero(matched.validity == 0)
+        seen = rectification.rig.seen(rectification.rig.points(matched, views[0]).positions)
+        self.assertLess(np.abs(seen - np.column_stack([columns, rows, matched.disparity[rows, columns]])).max(), 1e-2)
+
     def test_where_there_is_no_depth(self):
         rig = mrfgs.Rig(mrfgs.Calibration.of_texts("cam0=[100 0 2; 0 100 2; 0 0 1]\ndoffs=5\nbaseline=20\n"))
         self.assertIsNone(rig.size)
@@ -1524,6 +1556,40 @@ class Sequences(Folder):
         for one, images in zip(self.matcher.match_all(large, options={"measure-every": 1}), large):
             self.assertEqual(one.max_disparity, mrfgs.match(*images, device="cpu").max_disparity)
 
+    def plain(self, seed):
+        """A pair whose middle rows are plain, and so say nothing of themselves, and points that do."""
+        left, right = pair(seed=seed)
+        left[20:40], right[20:40] = 128, 128
+        rows, columns = (grid.ravel() for grid in np.mgrid[2:60:6, 2:80:6])
+        return left, right, np.column_stack([columns, rows, np.where(rows < 30, 4.0, 9.0)])
+
+    def test_pairs_have_priors_of_their_own(self):
+        frames = [self.plain(seed) for seed in (1, 2, 3, 4)]
+        surface = {"prior": np.full((60, 80), 4.0), "prior_sigma": np.full((60, 80), 2.0), "prior_kind": "surface"}
+        given = [frames[0], (*frames[1][:2], None), (*frames[2][:2], surface), frames[3][:2]]
+        arguments = [{"prior": frames[0][2]}, {}, surface, {}]
+        alone = [self.matcher.match(*one[:2], 15, **more).disparity for one, more in zip(frames, arguments)]
+        found = [one.disparity for one in self.matcher.match_all(given, 15)]
+        self.assertEqual([np.array_equal(*both) for both in zip(found, alone)], [True] * 4)
+        # Control: without priors, those that had one have other maps.
+        without = [one.disparity for one in self.matcher.match_all([one[:2] for one in frames], 15)]
+        self.assertEqual([np.array_equal(*both) for both in zip(found, without)], [False, True, False, True])
+
+    def test_the_last_maps_are_known(self):
+        frames = [self.plain(seed)[:2] for seed in (1, 1, 2)]
+        own = [*frames[:2], self.plain(2)]
+        following = [one.disparity for one in self.matcher.match_all(frames, 15, prior="last")]
+        # A frame with a prior of its own takes that.
+        instead = [one.disparity for one in self.matcher.match_all(own, 15, prior="last", warn=False)]
+        self.assertEqual([np.array_equal(*both) for both in zip(instead, following)], [True, True, False])
+        self.assertTrue(np.array_equal(instead[2], self.matcher.match(*frames[2], 15, prior=own[2][2]).disparity))
+        first = self.matcher.match(*frames[0], 15)
+        known = np.where(first.validity & ~np.uint8(8 + 16) == 0, first.disparity, np.nan)
+        second = self.matcher.match(*frames[1], 15, prior=known, prior_kind="surface")
+        self.assertEqual([np.array_equal(*both) for both in zip(following, (first.disparity, second.disparity))], [True, True])
+        # Control: alone, the second frame has the map of the first, as it has its images.
+        self.assertFalse(np.array_equal(following[1], first.disparity))
+
     def test_rectified_on_the_way(self):
         left, right = raw_pair()
         by = mrfgs.Rectification(CAMERAS)
@@ -1677,7 +1743,12 @@ class Sequences(Folder):
             (TypeError, "pair 1: give two arrays, left and right", left),
             (TypeError, "pair 1: give two arrays, left and right", None),
             (TypeError, "pair 1: give two arrays, left and right", {"left": left, "right": right}),
-            (TypeError, "pair 1: give two arrays, left and right", (left, right, left)),
+            (TypeError, "pair 1: give two arrays, left and right", (left, right, None, None)),
+            (TypeError, "pair 1: prior: give an array of float16, float32 or float64", (left, right, left)),
+            (ValueError, "pair 1: prior: give a map of the left image, of shape (60, 80)", (left, right, np.ones((9, 9)))),
+            (ValueError, "pair 1: prior_sigma, prior_kind: give a prior too", (left, right, {"prior_sigma": 1})),
+            (TypeError, "pair 1: prior_kind: give \"points\" or \"surface\"", (left, right, {"prior": np.ones((9, 3)), "prior_kind": 7})),
+            (TypeError, "pair 1: prior: 'sigma' is none of prior, prior_sigma, prior_kind", (left, right, {"prior": np.ones((9, 3)), "sigma": 7})),
         ):
             found = []
 
@@ -1696,6 +1767,8 @@ class Sequences(Folder):
             (ValueError, "neither a preset nor a file", lambda: self.matcher.match_all(taken, 15, method="best")),
             (ValueError, "max_disparity", lambda: self.matcher.match_all(taken, -5)),
             (TypeError, "pairs: give an iterable of pairs", lambda: self.matcher.match_all(7, 15)),
+            (TypeError, "prior: give \"last\"", lambda: self.matcher.match_all(taken, 15, prior="first")),
+            (TypeError, "prior: give \"last\"", lambda: self.matcher.match_all(taken, 15, prior=np.ones((60, 80)))),
         ):
             self.refused(error, words, call)
         self.assertEqual(len(list(taken)), 1)
@@ -2048,7 +2121,7 @@ class Help(unittest.TestCase):
                     self.assertTrue(inspect.getdoc(value), f"{name}.{inner}")
         for thing, more in ((mrfgs.Calibration, None), (mrfgs.Calibration.of_texts, mrfgs.Calibration), (mrfgs.Rectification, None),
                             (mrfgs.Rectification.apply, None), (mrfgs.Rig, None), (mrfgs.Rig.depth, None), (mrfgs.Rig.millimetres, None),
-                            (mrfgs.Rig.points, None), (mrfgs.Points, None), (mrfgs.Points.save, None), (mrfgs.evaluate, None),
+                            (mrfgs.Rig.points, None), (mrfgs.Rig.seen, None), (mrfgs.Points, None), (mrfgs.Points.save, None), (mrfgs.evaluate, None),
                             (mrfgs.Matcher.match_all, mrfgs.Matcher.match)):
             text = inspect.getdoc(thing) + (inspect.getdoc(more) if more else "")
             for name in parameters(thing):

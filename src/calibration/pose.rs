@@ -73,8 +73,7 @@ fn of_numbers(text: &str) -> Option<std::result::Result<Pose, &'static str>> {
     let words = text.split(is_between).filter(|word| !word.is_empty());
     let numbers: Vec<f64> = words.map(|word| word.parse().ok()).collect::<Option<_>>()?;
     let rows = match numbers[..] {
-        [ref rows @ .., 0.0, 0.0, 0.0, 1.0] if rows.len() == 12 => rows,
-        ref rows if rows.len() == 12 => rows,
+        [ref rows @ .., 0.0, 0.0, 0.0, 1.0] | ref rows if rows.len() == 12 => rows,
         _ => return Some(Err(FORMS)),
     };
     let rotation: Matrix = std::array::from_fn(|y| std::array::from_fn(|x| rows[4 * y + x]));
