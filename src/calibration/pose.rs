@@ -107,7 +107,7 @@ mod tests {
             "R: [0, -1, 0, 0, 0, -1, 1, 0, 0]\nT: [0.5, -0.25, 2]\n",
             "P0: 1 0 0 0 0 1 0 0 0 0 1 0\nTr_velo_to_cam: 0 -1 0 0.5 0 0 -1 -0.25 1 0 0 2\n",
             "P0: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 0 -1 0 0.5 0 0 -1 -0.25 1 0 0 2\n",
-            "# Image list\n4 0.5 -0.5 0.5 -0.5 0.5 -0.25 2 1 l.png\n1 2 -1\n5 1 0 0 0 0 0 0 1 r.png\n\n",
+            "# Image list\n4 0.5 0.5 -0.5 0.5 0.5 -0.25 2 1 l.png\n1 2 -1\n5 1 0 0 0 0 0 0 1 r.png\n\n",
         ] {
             let found = of(text).unwrap_or_else(|e| panic!("{text}: {e}"));
             let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
