@@ -1,6 +1,6 @@
 //! Pairs images of two cameras by the times in their headers.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use crate::messages::{SECOND, Stamp};
 
@@ -177,9 +177,74 @@ impl<T> LivePairing<T> {
     }
 }
 
+/// Messages of another sensor, such as a lidar, of which an image takes the one that is nearest in time.
+#[derive(Debug)]
+pub struct Companions<T> {
+    waiting: VecDeque<(Stamp, T, usize)>,
+    bytes: usize,
+}
+
+impl<T> Default for Companions<T> {
+    fn default() -> Self {
+        Self { waiting: VecDeque::new(), bytes: 0 }
+    }
+}
+
+impl<T> Companions<T> {
+    /// Adds a message of `bytes` bytes. The ones that came first go if all together are too large.
+    pub fn add(&mut self, stamp: Stamp, message: T, bytes: usize) {
+        self.waiting.push_back((stamp, message, bytes));
+        self.bytes += bytes;
+        while self.bytes > BYTES && self.waiting.len() > 1 {
+            self.bytes -= self.waiting.pop_front().map_or(0, |(.., bytes)| bytes);
+        }
+    }
+
+    /// The message nearest to the time `stamp`, if that is at most `within` nanoseconds away. Of two as near, the last one.
+    #[must_use]
+    pub fn nearest(&self, stamp: Stamp, within: u64) -> Option<&T> {
+        let apart = |other: &Stamp| other.0.abs_diff(stamp.0);
+        let nearest = self.waiting.iter().rev().min_by_key(|(other, ..)| apart(other));
+        nearest.filter(|(other, ..)| apart(other) <= within).map(|(_, message, _)| message)
+    }
+
+    /// Drops the messages before the time `stamp`.
+    pub fn forget_before(&mut self, stamp: Stamp) {
+        self.waiting.retain(|(other, ..)| *other >= stamp);
+        self.bytes = self.waiting.iter().map(|(.., bytes)| bytes).sum();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_nearest_companion_is_taken() {
+        let mut all = Companions::default();
+        for ms in [100, 300, 200, 400] {
+            all.add(Stamp(ms), ms, 1);
+        }
+        for (stamp, expected) in [
+            (100, Some(100)),
+            (240, Some(200)),
+            (250, Some(200)),
+            (251, Some(300)),
+            (500, Some(400)),
+            (501, None),
+            (-1, None),
+        ] {
+            assert_eq!(all.nearest(Stamp(stamp), 100).copied(), expected, "{stamp}");
+        }
+        all.forget_before(Stamp(300));
+        assert_eq!((all.nearest(Stamp(240), 100), all.nearest(Stamp(199), 100)), (Some(&300), None));
+        assert_eq!(all.bytes, 2);
+        // The memory is bounded, unless one alone is larger.
+        all.add(Stamp(700), 700, BYTES);
+        assert_eq!((all.waiting.len(), all.bytes), (1, BYTES));
+        all.add(Stamp(800), 800, 2 * BYTES);
+        assert_eq!((all.nearest(Stamp(700), 99), all.nearest(Stamp(800), 0)), (None, Some(&800)));
+    }
 
     /// The pairs among live images, each `l` or `r` with a time in milliseconds, in order of arrival.
     fn live(tolerance: u64, arriving: &str) -> (String, Tally) {

@@ -2,7 +2,7 @@
 
 use mrfgs::error::Reason;
 
-use crate::messages::{CameraInfo, CompressedImage, Encoding, Image, Type};
+use crate::messages::{CameraInfo, CompressedImage, Encoding, Image, PointCloud2, Type};
 
 /// A topic and its properties.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,6 +23,11 @@ impl Topic {
     pub fn has_images(&self) -> bool {
         let is_image = [Image::NAME, CompressedImage::NAME].contains(&self.kind.as_str());
         is_image && self.encoding.is_some()
+    }
+
+    /// Whether it has this name, with or without leading slash.
+    fn is_called(&self, name: &str) -> bool {
+        self.name.trim_start_matches('/') == name.trim_start_matches('/')
     }
 
     /// Whether its images are compressed files.
@@ -110,13 +115,29 @@ pub fn pair<'a>(topics: &'a [Topic], flag: &str) -> Result<[&'a Topic; 2], Reaso
     })
 }
 
+/// The topic of clouds called `name`, with or without leading slash.
+///
+/// # Errors
+/// If there is none, with a list of existing ones.
+pub fn clouds<'a>(topics: &'a [Topic], name: &str) -> Result<&'a Topic, Reason> {
+    let all = || topics.iter().filter(|topic| topic.kind == PointCloud2::NAME && topic.encoding.is_some());
+    all().find(|topic| topic.is_called(name)).ok_or_else(|| {
+        let names: Vec<_> = all().map(|topic| topic.name.clone()).collect();
+        let others = if names.is_empty() {
+            "no clouds at all".into()
+        } else {
+            format!("clouds on {}", listed(&names))
+        };
+        format!("contains no {} on {name}, but {others}", PointCloud2::NAME).into()
+    })
+}
+
 /// The image topic called `name`, with or without leading slash.
 ///
 /// # Errors
 /// If there is none, with a list of existing ones.
 pub fn named<'a>(topics: &'a [Topic], name: &str) -> Result<&'a Topic, Reason> {
-    let is_it = |topic: &&Topic| topic.name.trim_start_matches('/') == name.trim_start_matches('/');
-    match topics.iter().find(is_it) {
+    match topics.iter().find(|topic| topic.is_called(name)) {
         Some(topic) if topic.has_images() => Ok(topic),
         Some(topic) => Err(wrong(topic)),
         None => {

@@ -6,14 +6,16 @@ mod basics;
 mod bytes;
 mod definitions;
 mod graph;
+mod scan;
 mod types;
 
 pub use basics::{Encoding, Result, SECOND, Stamp};
 pub use definitions::definition;
 pub use graph::{Gid, NodeEntitiesInfo, ParticipantEntitiesInfo};
+pub use scan::Scan;
 pub use types::{
-    CameraInfo, CompressedImage, DisparityImage, Encode, FLOAT32, Header, Image, PointCloud2, PointField,
-    RegionOfInterest, Type, UINT8,
+    CameraInfo, CompressedImage, DisparityImage, Encode, FLOAT32, FLOAT64, Header, Image, PointCloud2,
+    PointField, RegionOfInterest, Type, UINT8,
 };
 
 #[cfg(test)]

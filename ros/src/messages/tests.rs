@@ -141,3 +141,110 @@ fn every_written_type_has_a_definition() {
     }
     assert_eq!(definition("std_msgs/msg/String"), "");
 }
+
+/// A cloud of rows of points, written byte by byte: fields with their offset and type, then the layout and the data.
+fn cloud_bytes(
+    size: [u32; 2],
+    fields: &[(&str, u32, u8)],
+    highest_first: bool,
+    steps: [u32; 2],
+    data: &[u8],
+) -> Vec<u8> {
+    let mut bytes = vec![0, 1, 0, 0];
+    let number = |bytes: &mut Vec<u8>, v: u32| {
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+        bytes.extend(v.to_le_bytes());
+    };
+    for v in [7, 500_000_000, 6] {
+        number(&mut bytes, v);
+    }
+    bytes.extend(b"lidar\0");
+    for v in [size[1], size[0], fields.len() as u32] {
+        number(&mut bytes, v);
+    }
+    for (name, offset, kind) in fields {
+        number(&mut bytes, name.len() as u32 + 1);
+        bytes.extend(name.as_bytes());
+        bytes.push(0);
+        number(&mut bytes, *offset);
+        bytes.push(*kind);
+        number(&mut bytes, 1);
+    }
+    bytes.push(highest_first.into());
+    for v in [steps[0], steps[1], data.len() as u32] {
+        number(&mut bytes, v);
+    }
+    bytes.extend(data);
+    bytes.push(1);
+    bytes
+}
+
+#[test]
+fn points_are_read_in_any_layout() {
+    let points = |bytes: &[u8]| Scan::decode(bytes, Encoding::Cdr).map(|scan| scan.points);
+    let tight = [("x", 0, FLOAT32), ("y", 4, FLOAT32), ("z", 8, FLOAT32)];
+    let values = [1.5_f32, -2.0, 3.25, 4.0, 5.0, -6.5];
+    let two = [[1.5, -2.0, 3.25], [4.0, 5.0, -6.5]];
+    let data = values.map(f32::to_le_bytes).concat();
+    let whole = cloud_bytes([2, 1], &tight, false, [12, 24], &data);
+    let scan = Scan::decode(&whole, Encoding::Cdr).unwrap();
+    assert_eq!(scan.header, Header { stamp: Stamp(7_500_000_000), frame_id: "lidar".into() });
+    assert_eq!(scan.points, two);
+    // Numbers with the highest byte first, and the control that this is said by the message.
+    let swapped = values.map(f32::to_be_bytes).concat();
+    assert_eq!(points(&cloud_bytes([2, 1], &tight, true, [12, 24], &swapped)).unwrap(), two);
+    assert_ne!(points(&cloud_bytes([2, 1], &tight, false, [12, 24], &swapped)).unwrap(), two);
+    // Doubles at odd offsets, in another order, between other fields; two rows with a gap between them.
+    let odd =
+        [("intensity", 0, UINT8), ("z", 1, FLOAT64), ("x", 9, FLOAT32), ("ring", 13, 4), ("y", 15, FLOAT64)];
+    let mut data = Vec::new();
+    for [x, y, z] in two {
+        data.push(77);
+        data.extend(f64::to_le_bytes(z));
+        data.extend((x as f32).to_le_bytes());
+        data.extend([9, 9]);
+        data.extend(f64::to_le_bytes(y));
+        data.extend([1, 2, 3]);
+    }
+    assert_eq!(points(&cloud_bytes([1, 2], &odd, false, [23, 26], &data)).unwrap(), two);
+    // The last row may be without its gap, but not without its point.
+    assert_eq!(points(&cloud_bytes([1, 2], &odd, false, [23, 26], &data[..49])).unwrap(), two);
+    assert!(points(&cloud_bytes([1, 2], &odd, false, [23, 26], &data[..48])).is_err());
+    // A single row whose length is not given, points that are not finite, and no points at all.
+    let holes = [f32::NAN, 0.0, 0.0, 4.0, 5.0, -6.5].map(f32::to_le_bytes).concat();
+    assert_eq!(points(&cloud_bytes([2, 1], &tight, false, [12, 0], &holes)).unwrap(), two[1..]);
+    assert_eq!(points(&cloud_bytes([0, 1], &tight, false, [12, 0], &[])).unwrap(), [[0.0; 3]; 0]);
+    // What this crate writes.
+    let fields = tight.map(|(name, offset, datatype)| PointField { name, offset, datatype }).to_vec();
+    let data = values.map(f32::to_le_bytes).concat();
+    let written = PointCloud2 { fields, point_step: 12, data, ..PointCloud2::default() };
+    assert_eq!(points(&written.encode()).unwrap(), two);
+}
+
+#[test]
+fn damaged_clouds_are_refused() {
+    let refused = |bytes: &[u8]| Scan::decode(bytes, Encoding::Cdr).unwrap_err().to_string();
+    let fields = [("x", 0, FLOAT32), ("y", 4, FLOAT32), ("z", 8, FLOAT32)];
+    let data = [0; 24];
+    let whole = cloud_bytes([2, 1], &fields, false, [12, 24], &data);
+    // All but the flag at the end.
+    for length in 0..whole.len() - 1 {
+        assert!(Scan::decode(&whole[..length], Encoding::Cdr).is_err(), "{length}");
+    }
+    let of = |size, fields: &[_], steps| refused(&cloud_bytes(size, fields, false, steps, &data));
+    for (said, words) in [
+        (of([3, 1], &fields, [12, 36]), "24 bytes in rows of 36 for 3 x 1 points of 12 bytes"),
+        (of([1, 2], &fields, [12, 8]), "rows of 8"),
+        (of([u32::MAX, u32::MAX], &fields, [12, u32::MAX]), "for 4294967295 x 4294967295 points"),
+        (of([2, 1], &fields, [11, 24]), "has z at byte 8 of points of 11 bytes"),
+        (of([2, 1], &fields, [0, 0]), "has x at byte 0 of points of 0 bytes"),
+        (of([2, 1], &fields[..2], [12, 24]), "has no field z"),
+        (of([2, 1], &[("x", u32::MAX, FLOAT64), fields[1], fields[2]], [12, 24]), "has x at byte 4294967295"),
+        (
+            of([2, 1], &[("x", 0, 4), fields[1], fields[2]], [12, 24]),
+            "has x of type 4, not float32 or float64",
+        ),
+    ] {
+        assert!(said.contains(words), "no `{words}` in {said}");
+    }
+}

@@ -121,8 +121,10 @@ pub struct PointField {
 
 /// The type of a byte field.
 pub const UINT8: u8 = 2;
-/// The type of a float field.
+/// The type of a field of single precision.
 pub const FLOAT32: u8 = 7;
+/// The type of a field of double precision.
+pub const FLOAT64: u8 = 8;
 
 /// `sensor_msgs/msg/PointCloud2`, a list of finite points.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -166,7 +168,7 @@ types! {
 }
 
 impl Header {
-    fn decode(from: &mut Decoder) -> Result<Self> {
+    pub(super) fn decode(from: &mut Decoder) -> Result<Self> {
         Ok(Self { stamp: from.stamp()?, frame_id: from.string()?.into_owned() })
     }
 
