@@ -222,8 +222,10 @@ impl Prior {
         Ok(prior)
     }
 
-    /// The measured disparities of a match as a surface, with the usual standard deviation.
-    pub(crate) fn of_maps(maps: &Maps) -> Self {
+    /// The measured disparities of a match as a surface, with the usual standard deviation: what is known of the next frame of cameras that
+    /// stand still. [`Matcher::run_following`](crate::Matcher::run_following) does this for all frames.
+    #[must_use]
+    pub fn of_maps(maps: &Maps) -> Self {
         let sigma = fixed_sigma(PriorKind::Surface.usual_sigma());
         let known = |flags: &u8| if flags & flag::INVALID == 0 { sigma } else { 0 };
         Self { kind: PriorKind::Surface, disparity: maps.disparity.clone(), sigma: maps.validity.map(known) }

@@ -14,8 +14,10 @@ mod sign;
 pub(crate) use cameras::{CameraArgs, CameraNeed, above_zero};
 pub(crate) use execution::{ExecutionArgs, ThreadArgs};
 pub(crate) use method::MethodArgs;
+pub(crate) use prior::{
+    CloudPoints, PRIOR_TOPIC, PriorArgs, PriorFile, PriorNames, PriorTopicArgs, PriorView,
+};
 pub use prior::{Kind as PriorKind, LengthUnit};
-pub(crate) use prior::{PriorArgs, PriorFile, PriorNames, PriorView};
 pub(crate) use reading::{ReadingArgs, disparity, scale};
 pub(crate) use recording::{RecordingArgs, Topics};
 pub(crate) use rectification::{RectificationArgs, shown};

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::ValueEnum;
+use mrfgs::calibration::cameras::Pose;
 use mrfgs::calibration::pose;
 use mrfgs::depth::Rig;
 use mrfgs::error::ReadError;
@@ -17,6 +18,9 @@ use serde::Serialize;
 
 use crate::args::{CameraNeed, Sign};
 use crate::failure::{Failure, Result};
+
+/// The name of the group of flags that say what is known. There is at most one of them.
+const KNOWN: &str = "known";
 
 /// Largest list of points, in bytes.
 const MOST_BYTES: u64 = 1 << 30;
@@ -51,6 +55,11 @@ impl LengthUnit {
             Self::M => 1000.0,
         }
     }
+
+    /// The units of the baseline in one of these; 1 if that of the baseline is unknown.
+    fn scale(self, rig: &Rig) -> f64 {
+        rig.unit().millimetres().map_or(1.0, |theirs| self.millimetres() / theirs)
+    }
 }
 
 /// What is known before a match.
@@ -66,24 +75,38 @@ pub(crate) struct PriorArgs {
     ///   the frame of the left camera (x right, y down, z forward; with --rectify, as it took LEFT), or moved there by --prior-pose.
     ///
     /// With --rectify, maps and lists belong to the rectified view.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", group = KNOWN)]
     prior: Option<PathBuf>,
     /// Standard deviation of the known disparities, in pixels [default: 0.25 for points, 1 for surfaces]
-    #[arg(long, value_name = "PIXELS", requires = "prior", allow_negative_numbers = true)]
+    #[arg(long, value_name = "PIXELS", requires = KNOWN, allow_negative_numbers = true)]
     prior_sigma: Option<f64>,
     /// How to use them [default: points where at most a fifth of the pixels are known]
     #[arg(long, value_enum, value_name = "KIND", requires = "prior")]
     prior_kind: Option<Kind>,
     /// Unit of the file. A map with a unit holds depths, and a list x,y,depth [default: pixels of disparity; for a point cloud the unit of
     /// the baseline]
-    #[arg(long, value_enum, value_name = "UNIT", requires = "prior")]
+    #[arg(long, value_enum, value_name = "UNIT", requires = KNOWN)]
     prior_unit: Option<LengthUnit>,
     /// Where a point cloud comes from: the rotation and translation that take its points into the frame of the left camera
     ///
-    /// A text with 12 or 16 numbers, the rows of [R T]; entries R and T in YAML, JSON or as in KITTI's calib_velo_to_cam.txt; KITTI's
-    /// Tr_velo_to_cam or Tr; or COLMAP's images.txt, whose first image is the left one.
-    #[arg(long, value_name = "FILE", requires = "prior")]
+    /// A text with 12 or 16 numbers, the rows of [R T]; entries R and T in YAML, JSON or as in KITTI's `calib_velo_to_cam.txt`; KITTI's
+    /// `Tr_velo_to_cam` or Tr; or COLMAP's images.txt, whose first image is the left one.
+    #[arg(long, value_name = "FILE", requires = KNOWN)]
     prior_pose: Option<PathBuf>,
+}
+
+/// Points that arrive beside the images.
+#[derive(clap::Args, Clone)]
+#[command(next_help_heading = "What is known of the scene")]
+pub(crate) struct PriorTopicArgs {
+    /// Topic of a lidar, whose points are known in the images taken at the same time
+    ///
+    /// It carries `sensor_msgs/msg/PointCloud2` in metres, with x, y and z as float32 or float64. Each pair takes the cloud whose time is
+    /// nearest to that of the left image, at most 0.1 s from it. The points must be in the frame of the left camera (x right, y down, z
+    /// forward; as it took the image). tf is not read: if they are in another frame, give --prior-pose, with the matrix that
+    /// `ros2 run tf2_ros tf2_echo CAMERA LIDAR` prints for the frames of the left image and of the cloud.
+    #[arg(long, value_name = "TOPIC", group = KNOWN)]
+    pub(crate) prior_topic: Option<String>,
 }
 
 /// The view that a prior is for.
@@ -97,6 +120,8 @@ pub(crate) struct PriorView {
     pub(crate) rig: Option<Rig>,
 }
 
+/// The flag of a lidar's topic.
+pub(crate) const PRIOR_TOPIC: &str = "--prior-topic";
 /// The flags of a prior, for messages.
 const FLAGS: PriorNames =
     PriorNames { file: "--prior", kind: "--prior-kind", unit: "--prior-unit", pose: "--prior-pose" };
@@ -130,15 +155,53 @@ impl PriorArgs {
 
     /// Reads a file as the flags say, whatever file they name.
     pub(crate) fn read_file(&self, path: &Path, view: PriorView) -> Result<Arc<Prior>> {
-        if let Some(sigma) = self.prior_sigma.filter(|sigma| !(*sigma > 0.0 && sigma.is_finite())) {
-            return Err(Failure::usage("--prior-sigma", format!("{sigma} is not above 0")));
-        }
+        self.check_sigma()?;
         self.at(path).read(view)
+    }
+
+    fn check_sigma(&self) -> Result<()> {
+        match self.prior_sigma.filter(|sigma| !(*sigma > 0.0 && sigma.is_finite())) {
+            Some(sigma) => Err(Failure::usage("--prior-sigma", format!("{sigma} is not above 0"))),
+            None => Ok(()),
+        }
+    }
+
+    /// How the points of clouds from a topic become priors of a view.
+    pub(crate) fn points(&self, view: PriorView) -> Result<CloudPoints> {
+        self.check_sigma()?;
+        let reason = "needs the unit of the baseline, as points are in metres in ROS; add an entry `unit` to the calibration: mm, cm or m, or \
+                      add it to --baseline";
+        let needed = || Failure::usage(PRIOR_TOPIC, reason);
+        let rig = view.rig.filter(|rig| rig.unit().millimetres().is_some()).ok_or_else(needed)?;
+        let pose = self.prior_pose.as_deref().map(pose::read).transpose()?;
+        let unit = self.prior_unit.unwrap_or(LengthUnit::M);
+        let sigma = self.prior_sigma.unwrap_or(PriorKind::Points.usual_sigma());
+        Ok(CloudPoints { size: view.size, rig, pose, scale: unit.scale(&rig), sigma })
     }
 
     fn at<'a>(&'a self, path: &'a Path) -> PriorFile<'a> {
         let &Self { prior_sigma: sigma, prior_kind: kind, prior_unit: unit, .. } = self;
         PriorFile { path, sigma, kind, unit, pose: self.prior_pose.as_deref(), names: FLAGS }
+    }
+}
+
+/// How points of the scene become the prior of a view.
+pub(crate) struct CloudPoints {
+    size: (usize, usize),
+    rig: Rig,
+    /// The pose of the points.
+    pose: Option<Pose>,
+    /// The baseline's units in a unit of the points.
+    scale: f64,
+    /// Standard deviation in pixels.
+    sigma: f64,
+}
+
+impl CloudPoints {
+    /// The prior of these points.
+    pub(crate) fn prior(&self, points: impl IntoIterator<Item = [f64; 3]>) -> mrfgs::Result<Prior> {
+        let placed = |point| self.pose.map_or(point, |pose| pose.moved(point)).map(|v| v * self.scale);
+        Prior::scene(&self.rig, self.size, points.into_iter().map(placed), self.sigma)
     }
 }
 
@@ -221,17 +284,15 @@ impl PriorFile<'_> {
 
     /// The baselines' units in a unit of the file.
     fn scale(&self, rig: &Rig) -> f64 {
-        let lengths = self.unit.map(LengthUnit::millimetres).zip(rig.unit().millimetres());
-        lengths.map_or(1.0, |(own, theirs)| own / theirs)
+        self.unit.map_or(1.0, |unit| unit.scale(rig))
     }
 
     /// The points of a cloud that the left view sees.
     fn cloud(&self, view: PriorView, rig: &Rig) -> Result<Prior> {
         let pose = self.pose.map(pose::read).transpose()?;
-        let scale = self.scale(rig);
-        let points = read_cloud::positions(self.path)?.into_iter();
-        let points = points.map(|point| pose.map_or(point, |pose| pose.moved(point)).map(|v| v * scale));
-        Prior::scene(rig, view.size, points, self.sigma_of(PriorKind::Points)).map_err(|e| self.of_library(e))
+        let (scale, sigma) = (self.scale(rig), self.sigma_of(PriorKind::Points));
+        let points = CloudPoints { size: view.size, rig: *rig, pose, scale, sigma };
+        points.prior(read_cloud::positions(self.path)?).map_err(|e| self.of_library(e))
     }
 
     /// A value of the file, a disparity or with a unit a depth, as a disparity; not finite if it is none.

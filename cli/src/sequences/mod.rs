@@ -1,6 +1,7 @@
 //! Sequences of pairs: numbered images, streams of frames, and recordings.
 
 mod files;
+pub(crate) mod known;
 mod pairing;
 mod recorded;
 mod rectifier;
@@ -10,6 +11,7 @@ mod stream;
 use std::collections::VecDeque;
 use std::mem;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::ValueEnum;
 use mrfgs::image::raster::Raster;
@@ -17,11 +19,13 @@ use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, Plane, Rect};
 use mrfgs::{Error, Result, threads};
 use mrfgs_ros::messages::Header;
+use mrfgs_ros::recording::Message;
 
 use crate::ffmpeg::Complaint;
 
 pub(crate) use pairing::Pairing;
 pub(crate) use recorded::Recorded;
+use recorded::RecordedViews;
 pub(crate) use rectifier::{Rectifier, turned};
 use stream::Stream;
 pub(crate) use stream::{FrameRate, RawFrames, raw_frames};
@@ -99,6 +103,8 @@ pub(crate) struct FramePair {
     pub(crate) name: String,
     /// The ROS header of a recorded left view.
     pub(crate) header: Option<Header>,
+    /// The recorded cloud that belongs to it.
+    pub(crate) cloud: Option<Arc<Message>>,
     pub(crate) pair: Pair,
 }
 
@@ -129,11 +135,12 @@ pub(crate) struct Frames {
     names: [String; 2],
 }
 
-/// The name and the header of a left view.
+/// The name and the header of a left view, and the cloud that belongs to it.
 #[derive(Default)]
 struct FrameInfo {
     name: Option<String>,
     header: Option<Header>,
+    cloud: Option<Arc<Message>>,
 }
 
 /// Both views at one point in time.
@@ -251,12 +258,12 @@ impl Frames {
     }
 
     fn rasters(&mut self) -> Option<Result<Rasters>> {
-        let of = |name| FrameInfo { name, header: None };
+        let of = |name| FrameInfo { name, ..FrameInfo::default() };
         let (left, right) = match &mut self.views {
             FrameSource::Recorded(recorded) => {
-                return Some(recorded.next()?.map(|(header, views)| {
+                return Some(recorded.next()?.map(|RecordedViews { header, views, cloud }| {
                     let name = Some(header.stamp.to_string());
-                    (FrameInfo { name, header: Some(header) }, views)
+                    (FrameInfo { name, header: Some(header), cloud }, views)
                 }));
             }
             FrameSource::Sources { left, right: None, layout } => {
@@ -282,7 +289,7 @@ impl Frames {
         }
     }
 
-    fn frame(&mut self, (FrameInfo { name, header }, [left, right]): Rasters) -> Result<FramePair> {
+    fn frame(&mut self, (FrameInfo { name, header, cloud }, [left, right]): Rasters) -> Result<FramePair> {
         let name = name.unwrap_or_else(|| format!("{:06}", self.count));
         let left = match &self.mask {
             Some(mask) => left.masked_by(mask.clone()).map_err(|e| named(e, &name))?,
@@ -298,7 +305,7 @@ impl Frames {
             )));
         }
         self.count += 1;
-        Ok(FramePair { name, header, pair })
+        Ok(FramePair { name, header, cloud, pair })
     }
 }
 

@@ -7,11 +7,12 @@ use mrfgs::image::raster::Raster;
 use mrfgs::image::read::Reader;
 use mrfgs::{Error, Result, threads};
 use mrfgs_ros::messages::{CameraInfo, Header, Stamp};
-use mrfgs_ros::pairing::{Pairing, Tally};
+use mrfgs_ros::pairing::{Companions, Pairing, Tally};
 use mrfgs_ros::recording::{Message, Recording};
 use mrfgs_ros::topics::{self, Topic};
 
 use crate::args::{RecordingArgs, Topics};
+use crate::sequences::known::SAME_TIME;
 use crate::sequences::ros;
 use crate::text::plural;
 
@@ -23,6 +24,7 @@ pub(crate) struct Recorded {
     cameras: Option<[(String, CameraInfo); 2]>,
     messages: Box<dyn Iterator<Item = Result<Message>> + Send>,
     pairing: Pairing<Message>,
+    clouds: Option<Clouds>,
     /// The error that ended the messages.
     error: Option<Error>,
     ended: bool,
@@ -32,6 +34,13 @@ pub(crate) struct Recorded {
     /// For each camera, the number of images with a time and with time 0.
     timed: [[usize; 2]; 2],
     remarks: Remarks,
+}
+
+/// The clouds of a lidar beside the images.
+struct Clouds {
+    /// The number of their topic among those that are read.
+    topic: usize,
+    waiting: Companions<Arc<Message>>,
 }
 
 /// How messages become images.
@@ -55,8 +64,12 @@ struct Noted {
     missing: Option<(u64, u64)>,
 }
 
-/// Both views at one point in time, and the header of the left one.
-pub(super) type RecordedViews = (Header, [Raster<'static>; 2]);
+/// Both views at one point in time, the header of the left one, and the cloud that belongs to it.
+pub(super) struct RecordedViews {
+    pub(super) header: Header,
+    pub(super) views: [Raster<'static>; 2],
+    pub(super) cloud: Option<Arc<Message>>,
+}
 
 impl Recorded {
     /// Whether `path` is a recording, by its name or its first bytes.
@@ -64,11 +77,16 @@ impl Recorded {
         Recording::is(path)
     }
 
-    /// Opens the recording `path`.
+    /// Opens the recording `path`, with the topic `clouds` of a lidar, if there is one.
     ///
     /// # Errors
-    /// If it cannot be read, or does not have two image topics that form a pair.
-    pub(crate) fn open(path: &Path, args: &RecordingArgs, reader: Reader) -> Result<Self> {
+    /// If it cannot be read, does not have two image topics that form a pair, or no such topic of a lidar.
+    pub(crate) fn open(
+        path: &Path,
+        args: &RecordingArgs,
+        clouds: Option<&str>,
+        reader: Reader,
+    ) -> Result<Self> {
         let recording = Recording::open(path)?;
         let all = recording.topics();
         let chosen = match &args.topics {
@@ -80,13 +98,19 @@ impl Recorded {
         let chosen = chosen.map_err(|reason| Error::read(path, reason))?.map(Topic::clone);
         let cameras = cameras(&recording, &chosen)?;
         let infos = cameras.iter().flatten().map(|(topic, _)| topic.as_str());
-        let names: Vec<_> = chosen.iter().map(|topic| topic.name.as_str()).chain(infos).collect();
+        let mut names: Vec<_> = chosen.iter().map(|topic| topic.name.as_str()).chain(infos).collect();
+        let clouds = clouds.map(|name| topics::clouds(all, name)).transpose();
+        let clouds = clouds.map_err(|reason| Error::read(path, reason))?.map(|topic| {
+            names.push(&topic.name);
+            Clouds { topic: names.len() - 1, waiting: Companions::default() }
+        });
         let remarks = Remarks::default();
         remarks.note(|noted| noted.missing = recording.missing());
         Ok(Self {
             files: recording.files().map(Path::to_owned).collect(),
             messages: Box::new(recording.messages(&names)),
             cameras,
+            clouds,
             pairing: Pairing::new(args.tolerance.unwrap_or(0)),
             error: None,
             ended: false,
@@ -155,12 +179,16 @@ impl Recorded {
             }
             let pair = self.pairing.next(self.ended);
             self.remarks.note(|noted| noted.tally = self.pairing.tally());
-            if let Some([(_, left), (_, right)]) = pair {
+            if let Some([(stamp, left), (_, right)]) = pair {
                 self.count += 1;
+                let cloud = self.clouds.as_mut().and_then(|clouds| {
+                    clouds.waiting.forget_before(Stamp(stamp.0.saturating_sub(SAME_TIME as i64)));
+                    clouds.waiting.nearest(stamp, SAME_TIME).map(Arc::clone)
+                });
                 let images = &self.images;
                 let (l, r) = threads::join(|| images.view(&left), || images.view(&right));
                 let header = header(&left).map_err(|reason| images.at(&left, reason));
-                return Some(header.and_then(|header| Ok((header, [l?, r?]))));
+                return Some(header.and_then(|header| Ok(RecordedViews { header, views: [l?, r?], cloud })));
             }
             if self.ended {
                 let error = self.error.take();
@@ -176,6 +204,13 @@ impl Recorded {
 
     fn add(&mut self, message: Message) -> Result<()> {
         let (side, bytes) = (message.topic, message.data.len());
+        if let Some(clouds) = self.clouds.as_mut().filter(|clouds| clouds.topic == side) {
+            // One without a time belongs to no image.
+            if let Ok(Header { stamp, .. }) = header(&message) {
+                clouds.waiting.add(stamp, Arc::new(message), bytes);
+            }
+            return Ok(());
+        }
         if let Some(side) = side.checked_sub(self.images.topics.len()) {
             self.check_camera(side, &message);
             return Ok(());

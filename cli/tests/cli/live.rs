@@ -2,10 +2,13 @@
 //! with other implementations.
 
 use mrfgs::Matcher;
+use mrfgs::depth::Rig;
+use mrfgs::image::calib::{Calibration, Camera, Unit};
 use mrfgs::options::Method;
 use mrfgs_node::topics::{Participant, Publication, Subscriptions};
 use mrfgs_ros::messages::{
-    CameraInfo, CompressedImage, DisparityImage, Encode, Encoding, Header, Image, Stamp, Type,
+    CameraInfo, CompressedImage, DisparityImage, Encode, Encoding, FLOAT32, Header, Image, PointCloud2,
+    PointField, Stamp, Type,
 };
 
 use super::*;
@@ -44,6 +47,9 @@ impl Node {
 struct Peer {
     images: [Publication; 2],
     infos: [Publication; 2],
+    lidar: Publication,
+    /// What the lidar sends with every pair.
+    cloud: Option<PointCloud2>,
     disparities: Subscriptions,
     /// Depths in the view of a third camera.
     depths: Subscriptions,
@@ -51,18 +57,23 @@ struct Peer {
 }
 
 impl Peer {
-    fn new() -> Self {
+    /// Cameras below `/cameras`, and a node below `/node`.
+    fn new(cameras: &str, node: &str) -> Self {
         let participant = Participant::new(domain()).unwrap();
         let publish = |name: &str, kind| participant.publish(name, kind).unwrap();
         let mut disparities = Subscriptions::new().unwrap();
-        disparities.add(&participant, "/robot/disparity", DisparityImage::NAME, true).unwrap();
+        disparities.add(&participant, &format!("/{node}/disparity"), DisparityImage::NAME, true).unwrap();
         let mut depths = Subscriptions::new().unwrap();
-        depths.add(&participant, "/robot/depth_registered/image", Image::NAME, true).unwrap();
+        let registered = format!("/{node}/depth_registered/image");
+        depths.add(&participant, &registered, Image::NAME, true).unwrap();
         Self {
             depths,
-            images: ["left", "right"].map(|side| publish(&format!("/cam/{side}/image_rect"), Image::NAME)),
+            images: ["left", "right"]
+                .map(|side| publish(&format!("/{cameras}/{side}/image_rect"), Image::NAME)),
             infos: ["left", "right"]
-                .map(|side| publish(&format!("/cam/{side}/camera_info"), CameraInfo::NAME)),
+                .map(|side| publish(&format!("/{cameras}/{side}/camera_info"), CameraInfo::NAME)),
+            lidar: publish(&format!("/{node}/lidar"), PointCloud2::NAME),
+            cloud: None,
             disparities,
             sent: 0,
         }
@@ -72,6 +83,9 @@ impl Peer {
     fn send(&mut self, views: &[image::RgbImage; 2], step: u32) {
         self.sent += 1;
         let header = Header { stamp: Stamp(self.sent * 50_000_000), frame_id: "eye".into() };
+        if let Some(cloud) = &self.cloud {
+            self.lidar.send(PointCloud2 { header: header.clone(), ..cloud.clone() }.encode()).unwrap();
+        }
         for (side, view) in views.iter().enumerate() {
             let (width, height) = view.dimensions();
             let mut p = [0.0; 12];
@@ -121,6 +135,90 @@ fn message(map: &Plane<f32>, header: &Header, delta_d: f32) -> Vec<u8> {
         .encode()
 }
 
+/// The median error that is expected.
+fn typical_sigma(matched: &mrfgs::Matched) -> f32 {
+    let mut sigmas = matched.sigma().into_data();
+    sigmas.retain(|sigma| sigma.is_finite());
+    sigmas.sort_by(f32::total_cmp);
+    sigmas[(sigmas.len() - 1) / 2]
+}
+
+#[test]
+fn a_node_knows_points_and_its_last_map() {
+    let views = [0, 1].map(|i| image::open(scene("poster").join(format!("im{i}.png"))).unwrap().to_rgb8());
+    let pair = mrfgs::Pair::open(scene("poster/im0.png"), scene("poster/im1.png")).unwrap();
+    let truth = read_pfm(scene("poster/disp0GT.pfm"));
+    // Points of the truth in single precision, as a camera with this focal length and baseline sees them.
+    let pixels = (0..180).flat_map(|y| (0..240).map(move |x| (x, y))).step_by(97);
+    let points: Vec<[f32; 3]> = pixels
+        .filter(|at| truth[*at].is_finite())
+        .map(|(x, y)| {
+            let z = 36.0 / truth[(x, y)];
+            [(x as f32 - 119.5) * z / 300.0, (y as f32 - 89.5) * z / 300.0, z]
+        })
+        .collect();
+    let fields = ["x", "y", "z"].into_iter().enumerate();
+    let fields =
+        fields.map(|(i, name)| PointField { name, offset: 4 * i as u32, datatype: FLOAT32 }).collect();
+    let data = points.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
+    let camera = Camera { focal_length: [300.0; 2], principal_point: [119.5, 89.5] };
+    let rig = Rig::new(&Calibration::of_cameras(camera, 0.12, Unit::Metre)).unwrap();
+    let prior = mrfgs::Prior::scene(&rig, (240, 180), points.iter().map(|point| point.map(f64::from)), 0.25);
+    let mut matcher =
+        Matcher::builder().method(Method::preset("fast").unwrap()).device("cpu").build().unwrap();
+    let range = options::DisparityRange::new(0, 47).unwrap();
+    let plain = matcher.run(&pair, range).unwrap();
+    let known = matcher.job(&pair, range).prior(std::sync::Arc::new(prior.unwrap())).run().unwrap();
+    let mut chain = Vec::new();
+    let frames = std::iter::repeat_n((pair, range), 12);
+    let go_on = std::sync::atomic::AtomicBool::new(false);
+    matcher
+        .run_following(frames, &go_on, |matched| {
+            chain.push(matched);
+            std::ops::ControlFlow::Continue(())
+        })
+        .unwrap();
+    let differ = |a: &mrfgs::Matched, b: &mrfgs::Matched| a.disparity().data() != b.disparity().data();
+    assert!(differ(&plain, &known) && differ(&plain, &chain[1]) && differ(&known, &chain[1]), "control");
+    let is = |found: &[u8], matched: &mrfgs::Matched| {
+        let header = Header::of(found, Encoding::Cdr).unwrap();
+        found == message(&matched.disparity(), &header, typical_sigma(matched))
+    };
+    let names = "-r __ns:=/known -r left/image_raw:=left/image_rect -r right/image_raw:=right/image_rect";
+    let node = Node::new(&format!("{names} --prior-topic lidar"));
+    let mut peer = Peer::new("known", "known");
+    // Before the node has heard of the lidar, nothing is known.
+    assert!(is(&peer.disparity(&views), &plain));
+    peer.cloud = Some(PointCloud2 { header: Header::default(), fields, point_step: 12, data });
+    let start = Instant::now();
+    loop {
+        let found = peer.disparity(&views);
+        if is(&found, &known) {
+            break;
+        }
+        assert!(is(&found, &plain), "neither with the points nor without");
+        assert!(start.elapsed() < Duration::from_secs(60), "the points are not known");
+    }
+    let said = node.stop();
+    assert_eq!(
+        said.matches("no cloud of /known/lidar is within 0.1 s of the left image").count(),
+        1,
+        "{said}"
+    );
+    // The maps of the frames before.
+    let node = Node::new(&format!("{names} --prior last"));
+    let start = Instant::now();
+    loop {
+        let found = peer.disparity(&views);
+        if chain[1..].iter().any(|matched| differ(matched, &plain) && is(&found, matched)) {
+            break;
+        }
+        assert!(start.elapsed() < Duration::from_secs(60), "the last map is not known");
+    }
+    let said = node.stop();
+    assert!(!said.contains("no cloud"), "{said}");
+}
+
 #[test]
 fn a_node_matches_what_cameras_publish() {
     let folder = Folder::new();
@@ -132,7 +230,7 @@ fn a_node_matches_what_cameras_publish() {
     ));
     let views =
         ["im0.png", "im1.png"].map(|name| image::open(scene("slanted").join(name)).unwrap().to_rgb8());
-    let mut peer = Peer::new();
+    let mut peer = Peer::new("cam", "robot");
     let found = peer.disparity(&views);
 
     let pair = mrfgs::Pair::open(scene("slanted/im0.png"), scene("slanted/im1.png")).unwrap();
@@ -144,10 +242,7 @@ fn a_node_matches_what_cameras_publish() {
     assert!(
         header.stamp.0 > 0 && header.stamp.0 <= peer.sent * 50_000_000 && header.stamp.0 % 50_000_000 == 0
     );
-    let mut sigmas = matched.sigma().into_data();
-    sigmas.retain(|sigma| sigma.is_finite());
-    sigmas.sort_by(f32::total_cmp);
-    let typical = sigmas[(sigmas.len() - 1) / 2];
+    let typical = typical_sigma(&matched);
     let mut map = matched.disparity();
     assert!(found == message(&map, &header, typical), "same as the library's map");
     map[(7, 7)] = f32::from_bits(map[(7, 7)].to_bits() ^ 1);
@@ -246,6 +341,9 @@ fn invalid_flags_of_a_node_are_refused() {
         ("--remap __node:=1", "--remap & not a valid node name"),
         ("--domain 233", "--domain & 233"),
         ("--tolerance -1", "--tolerance & from 0 to 3600"),
+        ("--prior .", "--prior & is a folder & --prior-topic"),
+        ("--prior last --prior-topic /lidar", "--prior & --prior-topic"),
+        ("--prior-topic /a//b", "--prior-topic & /a//b & not a valid ROS name"),
         ("--also preview", "--also preview & cannot be sent as a ROS message"),
         ("--also depth-registered", "--also depth-registered & --into"),
         ("--also points.pcd", "--also points.pcd & cannot be sent as a ROS message"),

@@ -7,7 +7,7 @@ use mrfgs::image::Rect;
 const MATCH: &str = "match im0.png im1.png map.pfm --max-disparity 31 --device cpu";
 
 /// A folder with the poster, whose plain wall needs what is known of it.
-fn poster() -> Folder {
+pub(super) fn poster() -> Folder {
     let folder = Folder::new();
     for file in ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt"] {
         fs::copy(scene("poster").join(file), folder.join(file)).unwrap();
@@ -29,13 +29,13 @@ fn wrong(folder: &Folder) -> f64 {
 }
 
 /// Every 97th point that the truth shows, in the frame of the left camera.
-fn points(folder: &Folder) -> Vec<[f64; 3]> {
+pub(super) fn points(folder: &Folder) -> Vec<[f64; 3]> {
     run(folder, "depth disp0GT.pfm truth.pfm --calib calib.txt --left im0.png --also points,depth,depth-mm")
         .succeeded();
     cloud(&folder.join("truth.points.ply")).into_iter().step_by(97).map(|point| point.0).collect()
 }
 
-fn lines(points: &[[f64; 3]]) -> String {
+pub(super) fn lines(points: &[[f64; 3]]) -> String {
     points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect()
 }
 

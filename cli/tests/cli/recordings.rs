@@ -643,3 +643,102 @@ fn images_in_luma_and_chroma_are_matched() {
     });
     assert!(planes == wanted);
 }
+
+/// A cloud of points in double precision, each after four bytes of something else.
+fn cloud_message(stamp: u64, points: &[[f64; 3]]) -> Vec<u8> {
+    let (count, step) = (points.len() as u32, 28);
+    let message = Bytes::with_header(stamp, "lidar").u32(1).u32(count).u32(4);
+    let fields = [("intensity", 0, 7), ("x", 4, 8), ("y", 12, 8), ("z", 20, 8)];
+    let message = fields
+        .into_iter()
+        .fold(message, |all, (name, offset, kind)| all.text(name).u32(offset).bytes(&[kind]).u32(1));
+    let message = message.bytes(&[0]).u32(step).u32(step * count).u32(step * count);
+    let point = |all: Bytes, point: &[f64; 3]| {
+        point.iter().fold(all.bytes(&[7; 4]), |all, v| all.bytes(&v.to_le_bytes()))
+    };
+    points.iter().fold(message, point).bytes(&[1]).0
+}
+
+#[test]
+fn the_points_of_a_lidar_are_known() {
+    let folder = priors::poster();
+    let views = [0, 1].map(|view| {
+        let path = folder.join(format!("im{view}.png"));
+        let image = image::open(&path).unwrap().to_rgb8();
+        image.save(&path).unwrap();
+        image
+    });
+    let points = priors::points(&folder);
+    // A lidar looks along x, with y to the left and z up, from 0.3 m above and 1 m behind.
+    let scan: Vec<_> = points.iter().map(|[x, y, z]| [z + 1.0, -x, -y - 0.3]).collect();
+    fs::write(folder.join("scan.xyz"), priors::lines(&scan)).unwrap();
+    fs::write(folder.join("lidar.txt"), "0 -1 0 0\n0 0 -1 -0.3\n1 0 0 -1\n").unwrap();
+    let flags = "--max-disparity 31 --device cpu";
+    let alone = |more: &str| {
+        run(&folder, &format!("match im0.png im1.png map.pfm {flags} --quiet {more}")).succeeded();
+        fs::read(folder.join("map.pfm")).unwrap()
+    };
+    let (plain, with) = (alone(""), alone("--prior scan.xyz --prior-pose lidar.txt"));
+    assert!(plain != with, "control: the points matter");
+    // Three frames with a second between them. The nearest cloud counts, and the third frame has none.
+    const SECOND: u64 = 1_000_000_000;
+    let mut messages = Vec::new();
+    for n in 0..3 {
+        for (view, side) in ["left", "right"].into_iter().enumerate() {
+            let image = image_message(START + SECOND * n, &views[view]);
+            messages.push((format!("/{side}/image_rect"), IMAGE, image));
+        }
+    }
+    let cloud = |ms: u64, points: &[[f64; 3]]| {
+        let stamp = START + ms * SECOND / 1000;
+        ("/lidar/points".to_owned(), "sensor_msgs/msg/PointCloud2", cloud_message(stamp, points))
+    };
+    messages.extend([cloud(60, &scan), cloud(1050, &scan[..9]), cloud(980, &scan), cloud(2101, &scan)]);
+    record(&folder.join("drive.mcap"), &messages);
+    let maps = |more: &str| {
+        let line = format!("sequence drive.mcap maps {flags} --calib calib.txt {more}");
+        let said = run(&folder, &line).succeeded().stderr;
+        let names = ["1700000000", "1700000001", "1700000002"];
+        let maps = names.map(|name| fs::read(folder.join(format!("maps/{name}.000000000.pfm"))).unwrap());
+        fs::remove_dir_all(folder.join("maps")).unwrap();
+        (maps, said)
+    };
+    let lidar = "--prior-topic lidar/points --prior-pose lidar.txt";
+    let (found, said) = maps(lidar);
+    assert!(found == [&with, &with, &plain].map(Clone::clone));
+    let missing = "no cloud of lidar/points is within 0.1 s of the left image at 1700000002.000000000";
+    assert_eq!(said.matches(missing).count(), 1, "{said}");
+    assert!(!said.contains("contradict"), "{said}");
+    assert!(maps("").0 == [&plain, &plain, &plain].map(Clone::clone), "control");
+    // Control: without the pose, the points are elsewhere.
+    assert!(maps("--prior-topic lidar/points").0[0] != with);
+    // Clouds that are damaged are not used, nor are those behind the camera.
+    let behind: Vec<_> = points.iter().map(|[x, y, z]| [x - z, *y, *z]).collect();
+    messages.truncate(6);
+    messages.extend([cloud(0, &scan), cloud(1000, &scan), cloud(2000, &behind)]);
+    messages[6].2.truncate(900);
+    record(&folder.join("drive.mcap"), &messages);
+    let (found, said) = maps(lidar);
+    assert!(found == [&plain, &with, &plain].map(Clone::clone));
+    assert!(said.contains("a cloud of lidar/points is not used: it ends early"), "{said}");
+    for (left, flags, code, words) in [
+        (
+            "drive.mcap",
+            "--prior-topic /nothing",
+            1,
+            "drive.mcap & no sensor_msgs/msg/PointCloud2 on /nothing & /lidar/points",
+        ),
+        ("drive.mcap", "--prior-topic /lidar/points --prior last", 2, "--prior & --prior-topic"),
+        ("drive.mcap", "--prior-pose lidar.txt", 2, "--prior-topic"),
+        ("drive.mcap", "--prior-topic /lidar/points --prior-sigma 0", 2, "--prior-sigma & not above 0"),
+        ("im0.png im1.png", "--prior-topic /lidar/points", 2, "--prior-topic & only applies to a recording"),
+    ] {
+        run(&folder, &format!("sequence {left} maps --calib calib.txt {flags} --max-disparity 31"))
+            .failed(code, words);
+    }
+    run(
+        &folder,
+        "sequence drive.mcap maps --focal 180 --baseline 3 --prior-topic /lidar/points --max-disparity 31",
+    )
+    .failed(2, "--prior-topic & unit of the baseline");
+}

@@ -34,6 +34,7 @@ pub(super) struct Listed {
 }
 
 /// The source of a pair; paths are as written in the list.
+#[allow(clippy::large_enum_variant, reason = "nearly all are rows")]
 enum Source {
     Row(Row),
     /// The folder in [`List::base`] named after the pair.

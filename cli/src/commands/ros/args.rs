@@ -7,7 +7,9 @@ use mrfgs_node::names::{Names, Rule};
 use mrfgs_node::topics::{GID_BYTES, LONG_GID_BYTES, MOST_DOMAIN};
 
 use crate::args::recording::nanoseconds;
-use crate::args::{CameraArgs, CropArgs, ExecutionArgs, MethodArgs, RectificationArgs, Search};
+use crate::args::{
+    CameraArgs, CropArgs, ExecutionArgs, MethodArgs, PriorArgs, PriorTopicArgs, RectificationArgs, Search,
+};
 use crate::failure::{Failure, Result};
 use crate::outputs::AlsoArgs;
 
@@ -26,7 +28,17 @@ Examples:
   # Cameras below /stereo, and more topics:
   mrfgs ros -r __ns:=/stereo --also depth,points
   # Cameras that are not triggered together:
-  mrfgs ros --tolerance 0.005";
+  mrfgs ros --tolerance 0.005
+  # With a lidar, and where it stands:
+  mrfgs ros --prior-topic lidar/points --prior-pose lidar.txt
+  # Cameras that stand still:
+  mrfgs ros --prior last";
+
+/// The flag `--prior` of nodes.
+const PRIOR: &str = "Disparities that are known: a file for all frames, or `last` for the frame before";
+const PRIORS: &str = "\
+Files are as for `mrfgs match`. With `last`, the disparities measured in a frame are known in the next: for cameras that stand still, whose \
+maps then flicker less.";
 
 /// Match live images of two cameras in ROS 2
 ///
@@ -45,6 +57,7 @@ Examples:
 /// 0. Malformed messages are reported and skipped.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
+#[command(mut_arg("prior", |arg| arg.help(PRIOR).long_help(format!("{PRIOR}\n\n{PRIORS}"))))]
 #[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
 pub(crate) struct Args {
     /// Renames a topic as in ROS: `FROM:=TO`. `__ns:=/NAMESPACE` puts all topics into a namespace, and `__node:=NAME` renames the node,
@@ -75,6 +88,10 @@ pub(crate) struct Args {
     pub(super) numbers: CameraArgs,
     #[command(flatten)]
     pub(super) rectification: RectificationArgs,
+    #[command(flatten)]
+    pub(super) prior: PriorArgs,
+    #[command(flatten)]
+    pub(super) prior_topic: PriorTopicArgs,
     /// Steadies still surfaces: where the image does not change, disparities are averaged with earlier frames, weighted by confidence
     #[arg(long)]
     pub(super) steady: bool,

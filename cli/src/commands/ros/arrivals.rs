@@ -1,18 +1,20 @@
 //! Subscriptions to the cameras, and the pairs that have arrived.
 
 use std::path::PathBuf;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use mrfgs::Error;
 use mrfgs::error::Reason;
 use mrfgs_node::names::Names;
 use mrfgs_node::topics::{Participant, Subscriptions};
-use mrfgs_ros::messages::{CameraInfo, CompressedImage, Encoding, Header, Image, Stamp, Type};
-use mrfgs_ros::pairing::{LivePairing, Tally};
+use mrfgs_ros::messages::{CameraInfo, CompressedImage, Encoding, Header, Image, PointCloud2, Stamp, Type};
+use mrfgs_ros::pairing::{Companions, LivePairing, Tally};
 use mrfgs_ros::topics::Topic;
 
+use crate::args::PRIOR_TOPIC;
 use crate::failure::{Failure, Result};
+use crate::sequences::known::SAME_TIME;
 use crate::stop;
 
 /// An error of the network.
@@ -25,6 +27,8 @@ pub(super) fn of_network(reason: impl Into<Reason>) -> Failure {
 pub(super) struct CameraTopics {
     images: [Topic; 2],
     infos: [String; 2],
+    /// The topic of a lidar, if there is one.
+    clouds: Option<String>,
 }
 
 /// A pair of images that has arrived.
@@ -32,6 +36,8 @@ pub(super) struct Arrived {
     pub(super) header: Header,
     /// The messages of both images.
     pub(super) images: [Vec<u8>; 2],
+    /// The cloud at its time, if there is one.
+    pub(super) cloud: Option<Arc<Vec<u8>>>,
     /// When the second image arrived.
     pub(super) at: Instant,
 }
@@ -54,6 +60,7 @@ struct State {
     /// The newest pair that has not been taken.
     pair: Option<Arrived>,
     infos: [Option<CameraInfo>; 2],
+    clouds: Companions<Arc<Vec<u8>>>,
     count: Count,
     /// Topic and reason of a malformed message that was not reported yet.
     unreadable: Option<(usize, Reason)>,
@@ -69,7 +76,7 @@ pub(super) struct Arrivals {
 }
 
 impl CameraTopics {
-    pub(super) fn new(names: &Names) -> Result<Self> {
+    pub(super) fn new(names: &Names, clouds: Option<&str>) -> Result<Self> {
         let named = |reason| Failure::usage("--remap", reason);
         let image = |name: &str| {
             let name = names.resolve(name).map_err(named)?;
@@ -88,7 +95,9 @@ impl CameraTopics {
             beside.map_or_else(|| names.resolve(name).map_err(named), Ok)
         };
         let infos = [info("left/camera_info", &images[0])?, info("right/camera_info", &images[1])?];
-        Ok(Self { images, infos })
+        let resolved = |name| names.resolve(name).map_err(|reason| Failure::usage(PRIOR_TOPIC, reason));
+        let clouds = clouds.map(resolved).transpose()?;
+        Ok(Self { images, infos, clouds })
     }
 
     /// The image topic of the left (0) or right (1) camera.
@@ -113,8 +122,16 @@ impl CameraTopics {
 
     /// The name and the type of a topic, by its number among the subscriptions.
     pub(super) fn topic(&self, number: usize) -> [&str; 2] {
-        let side = number % 2;
-        if number < 2 { [self.image(side), self.kind(side)] } else { [self.info(side), CameraInfo::NAME] }
+        match number {
+            side @ (0 | 1) => [self.image(side), self.kind(side)],
+            2 | 3 => [self.info(number - 2), CameraInfo::NAME],
+            _ => [self.clouds().unwrap_or_default(), PointCloud2::NAME],
+        }
+    }
+
+    /// The topic of a lidar, if there is one.
+    pub(super) fn clouds(&self) -> Option<&str> {
+        self.clouds.as_deref()
     }
 
     /// The name of an image with this time in errors.
@@ -122,7 +139,7 @@ impl CameraTopics {
         format!("{} at {stamp}", self.image(side)).into()
     }
 
-    /// Subscribes to the images, then to the calibrations.
+    /// Subscribes to the images, then to the calibrations and to a lidar.
     pub(super) fn subscribe(&self, participant: &Participant, reliable: bool) -> Result<Subscriptions> {
         let mut all = Subscriptions::new().map_err(of_network)?;
         for topic in &self.images {
@@ -130,6 +147,9 @@ impl CameraTopics {
         }
         for info in &self.infos {
             all.add(participant, info, CameraInfo::NAME, reliable).map_err(of_network)?;
+        }
+        if let Some(clouds) = &self.clouds {
+            all.add(participant, clouds, PointCloud2::NAME, reliable).map_err(of_network)?;
         }
         Ok(all)
     }
@@ -150,11 +170,10 @@ impl Arrivals {
         let mut pairing = LivePairing::new(tolerance);
         while stop::go_on().is_continue() {
             subscriptions.wait(patience, |topic, bytes| {
-                let side = topic % 2;
-                let taken = if topic < 2 {
-                    self.add_image(side, bytes, &mut pairing)
-                } else {
-                    self.add_info(side, &bytes)
+                let taken = match topic {
+                    side @ (0 | 1) => self.add_image(side, bytes, &mut pairing),
+                    2 | 3 => self.add_info(topic - 2, &bytes),
+                    _ => self.add_cloud(bytes),
                 };
                 if let Err(reason) = taken {
                     let mut state = self.state();
@@ -182,7 +201,7 @@ impl Arrivals {
         state.count.images[side] += 1;
         state.count.tally = pairing.tally();
         if let Some([(_, (header, left)), (_, (_, right))]) = pair {
-            let newest = Arrived { header, images: [left, right], at: Instant::now() };
+            let newest = Arrived { header, images: [left, right], cloud: None, at: Instant::now() };
             state.count.replaced += usize::from(state.pair.replace(newest).is_some());
             self.has_pair.notify_one();
         }
@@ -198,11 +217,21 @@ impl Arrivals {
         Ok(())
     }
 
-    /// The newest pair; `None` if none arrives within `patience`.
+    fn add_cloud(&self, bytes: Vec<u8>) -> mrfgs_ros::messages::Result<()> {
+        let Header { stamp, .. } = Header::of(&bytes, Encoding::Cdr)?;
+        let count = bytes.len();
+        self.state().clouds.add(stamp, Arc::new(bytes), count);
+        Ok(())
+    }
+
+    /// The newest pair, with the cloud that fits it best by now; `None` if none arrives within `patience`.
     pub(super) fn next(&self, patience: Duration) -> Option<Arrived> {
         let state = self.state();
         let waited = self.has_pair.wait_timeout_while(state, patience, |state| state.pair.is_none());
-        waited.unwrap_or_else(PoisonError::into_inner).0.pair.take()
+        let mut state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        let pair = state.pair.take()?;
+        let cloud = state.clouds.nearest(pair.header.stamp, SAME_TIME).map(Arc::clone);
+        Some(Arrived { cloud, ..pair })
     }
 
     /// The last calibration of both cameras, if both have sent one.

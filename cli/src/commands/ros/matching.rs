@@ -1,6 +1,7 @@
 //! Matches the pairs of a node. Range and calibration are determined again when the cameras change.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use mrfgs::calibration::cameras::ThirdCamera;
 use mrfgs::depth::Rig;
@@ -11,14 +12,15 @@ use mrfgs::rectification::Rectification;
 use mrfgs::sigma::Sigma;
 use mrfgs::steady::Steady;
 use mrfgs::threads;
-use mrfgs::{Conditioning, Matcher};
+use mrfgs::{Conditioning, Matcher, Prior};
 use mrfgs_ros::messages::{CameraInfo, Encoding, Header};
 
-use crate::args::Sign;
+use crate::args::{PriorTopicArgs, PriorView, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::messages::{self, Messages, Sink};
 use crate::outputs::{Also, Cameras, Outcome};
 use crate::pairs::input::{Calib, Input};
+use crate::sequences::known::{self, CloudDoubt, FramePriors};
 use crate::sequences::{Rectifier, ros};
 use crate::{console, remedy, stop};
 
@@ -41,6 +43,8 @@ pub(super) struct Matching<'a> {
     known: Option<RigState>,
     /// Whether a change of device has been reported.
     noted: bool,
+    /// Whether a pair without a cloud at its time has been reported.
+    cloudless: bool,
 }
 
 /// Everything derived from the cameras and the first pair.
@@ -53,6 +57,9 @@ struct RigState {
     rig: Option<Rig>,
     messages: Messages,
     steady: Option<Steady>,
+    priors: FramePriors,
+    /// What the last frame has shown, if that is known in the next.
+    last: Option<Arc<Prior>>,
     /// The corrections of the last measured frame, and the frames that they have been used for.
     corrections: Option<(Conditioning, u32)>,
 }
@@ -67,8 +74,22 @@ impl<'a> Matching<'a> {
         if args.are_rectified(&cameras) {
             args.rectification.options_if(false)?;
         }
+        if args.prior.file().is_some_and(Path::is_dir) {
+            let reason = "is a folder, but live frames have no names; give a file for all frames, or the topic of a lidar with --prior-topic";
+            return Err(Failure::usage("--prior", reason));
+        }
         let matcher = Matcher::builder().method(method).execution(execution).build()?;
-        Ok(Self { args, cameras, matcher, sigma, measure_every, third, known: None, noted: false })
+        Ok(Self {
+            args,
+            cameras,
+            matcher,
+            sigma,
+            measure_every,
+            third,
+            known: None,
+            noted: false,
+            cloudless: false,
+        })
     }
 
     /// Matches a pair and publishes the results; `infos` are the cameras' calibrations. Errors of single pairs go to the log.
@@ -92,7 +113,7 @@ impl<'a> Matching<'a> {
         match self.published(&arrived, infos, to) {
             Ok(doubts) => {
                 log.published(&arrived);
-                doubts.iter().flatten().for_each(|doubt| log.doubted(doubt));
+                doubts.iter().for_each(|doubt| log.doubted(doubt));
             }
             Err(Failure::Stopped(_)) => {}
             Err(failure @ Failure::Usage(_)) => return Err(failure),
@@ -106,7 +127,7 @@ impl<'a> Matching<'a> {
         arrived: &Arrived,
         infos: Option<[CameraInfo; 2]>,
         to: &mut Publications,
-    ) -> Result<[Option<String>; 2]> {
+    ) -> Result<Vec<String>> {
         let header = &arrived.header;
         let pair = self.pair(arrived)?;
         let is_known = |known: &RigState| known.size == pair.size() && known.infos == infos;
@@ -114,14 +135,35 @@ impl<'a> Matching<'a> {
             self.known = None;
             self.known = Some(self.begin(pair.clone(), infos)?);
         }
-        let Some(known) = &mut self.known else { return Ok([None, None]) };
+        let Some(known) = &mut self.known else { return Ok(Vec::new()) };
+        let mut doubts: Vec<String> = pair.doubts().iter().flatten().cloned().collect();
         let (pair, _) = known.rectifier.rectified(pair)?;
+        let cloud = arrived.cloud.as_ref().map(|cloud| (cloud.as_slice(), Encoding::Cdr));
+        let of_cloud = known.priors.of_cloud(cloud, header.stamp).unwrap_or_else(|doubt| {
+            match doubt {
+                // Once, as it may hold for all frames.
+                CloudDoubt::Missing(_) if std::mem::replace(&mut self.cloudless, true) => {}
+                CloudDoubt::Missing(doubt) | CloudDoubt::Unusable(doubt) => doubts.push(doubt),
+            }
+            None
+        });
+        let prior = of_cloud
+            .or_else(|| known.last.take())
+            .map_or_else(|| known.priors.of(""), |prior| Ok(Some(prior)))?;
         let corrections = known.corrections.filter(|(_, used)| *used < self.measure_every);
         let mut job = self.matcher.job(&pair, known.range).cancel(stop::flag());
         if let Some((measured, _)) = corrections {
             job = job.conditioning(measured);
         }
+        if let Some(prior) = prior {
+            job = job.prior(prior);
+        }
         let matched = job.run()?;
+        if known.priors.follow() {
+            known.last = Some(Arc::new(Prior::of_maps(&matched.maps)));
+        } else if let Some(doubt) = known::contradicted(&matched) {
+            doubts.push(doubt);
+        }
         known.corrections = Some((matched.conditioning, corrections.map_or(0, |(_, used)| used) + 1));
         if let Some(note) = matched.note.as_ref().filter(|_| !std::mem::replace(&mut self.noted, true)) {
             console::say(&remedy::error(note, &remedy::FLAGS));
@@ -150,7 +192,7 @@ impl<'a> Matching<'a> {
             to.put(DEPTH_CAMERA, header, &camera)?;
         }
         messages.put(header, self.args.also.contents(&outcome), to)?;
-        Ok(pair.doubts().clone())
+        Ok(doubts)
     }
 
     /// Decodes the images of a pair.
@@ -182,13 +224,18 @@ impl<'a> Matching<'a> {
             input.warn(None);
         }
         let word = args.also.take_cameras();
-        let rig = match word.map(Also::need) {
+        let clouds = PriorTopicArgs { prior_topic: self.cameras.clouds().map(str::to_owned) };
+        let prior_need = known::need(&args.prior, &clouds)?;
+        let taken = match word.map(Also::need).or(prior_need) {
             Some(need) => input.rig(Some(&need), Path::new(self.cameras.image(0)))?,
             None => None,
         };
+        let rig = taken.filter(|_| word.is_some());
         if let (Some(word), Some(rig)) = (word, &rig) {
             word.check_metres(rig)?;
         }
+        let view = PriorView { size, sign, rig: input.as_taken(taken) };
+        let priors = FramePriors::new(&args.prior, &clouds, view, None)?;
         let range = self.range(&input)?;
         let cameras = input.calibration().and_then(|calibration| Cameras::of(calibration, (0, 0)));
         let known = input.calibration().and_then(|known| Rectification::of_rectified(known, size).ok());
@@ -197,7 +244,18 @@ impl<'a> Matching<'a> {
             Messages::new(range, cameras, args.also.framed(self.third.as_ref())),
             args.steady.then(Steady::new),
         );
-        Ok(RigState { size, infos, range, rectifier, rig, messages, steady, corrections: None })
+        Ok(RigState {
+            size,
+            infos,
+            range,
+            rectifier,
+            rig,
+            messages,
+            steady,
+            priors,
+            last: None,
+            corrections: None,
+        })
     }
 
     /// The cameras' own calibrations as texts of files; `None` if the user gives the cameras.

@@ -29,7 +29,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let execution = args.execution.execution();
     args.also.check_messages("remove it")?;
     let (names, domain) = (args.names()?, args.domain()?);
-    let cameras = CameraTopics::new(&names)?;
+    let cameras = CameraTopics::new(&names, args.prior_topic.prior_topic.as_deref())?;
     let mut matching = Matching::new(args, cameras.clone(), execution)?;
     stop::listen();
     let participant = Participant::new(domain).map_err(of_network)?;
@@ -41,8 +41,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let _announcement = announced.map_err(of_network)?;
     if !args.quiet {
         console::say(&format!(
-            "{} subscribes to {} and {} and publishes {}; domain {domain}",
+            "{} subscribes to {}{} and {} and publishes {}; domain {domain}",
             names.node(),
+            cameras.clouds().map(|clouds| format!("{clouds}, ")).unwrap_or_default(),
             cameras.image(0),
             cameras.image(1),
             publications.names().join(", ")

@@ -1,7 +1,6 @@
 //! `mrfgs sequence`.
 
 mod kind;
-mod known;
 mod pipeline;
 mod writer;
 
@@ -18,19 +17,19 @@ use mrfgs::steady::Steady;
 use mrfgs::{Error, Matcher};
 
 use crate::args::{
-    CameraArgs, CropArgs, ExecutionArgs, MethodArgs, PriorArgs, PriorView, ReadingArgs, RecordingArgs,
-    RectificationArgs, RegionArgs, Search, Sign,
+    CameraArgs, CropArgs, ExecutionArgs, MethodArgs, PRIOR_TOPIC, PriorArgs, PriorTopicArgs, PriorView,
+    ReadingArgs, RecordingArgs, RectificationArgs, RegionArgs, Search, Sign,
 };
 use crate::failure::{Failure, Result};
 use crate::outputs::messages::Messages;
 use crate::outputs::{Also, Cameras, Files, MapArgs, files, is_printed};
 use crate::pairs::folder::CALIBRATION;
 use crate::pairs::input::{Calib, Input};
+use crate::sequences::known::{self, FramePriors};
 use crate::sequences::{FramePair, Frames, Layout, Pairing, RawFrames, Recorded, Rectifier, raw_frames};
 use crate::{console, ffmpeg, plan, stop};
 
 use kind::Kind;
-use known::FramePriors;
 use pipeline::Pipeline;
 use writer::{Records, Writer};
 
@@ -46,6 +45,8 @@ Examples:
   # A ROS recording that contains the calibration:
   mrfgs sequence drive.mcap maps --also depth-mm
   mrfgs sequence drive.mcap found.mcap --also depth,points
+  # With the lidar of the recording, and where it stands:
+  mrfgs sequence drive.mcap maps --prior-topic /lidar/points --prior-pose lidar.txt
   # Shown live in Foxglove:
   mrfgs sequence drive.mcap ws://localhost:8765 --also depth,points
   # With the scans of a lidar, one per frame, and where it stands:
@@ -129,6 +130,8 @@ pub(crate) struct Args {
     rectification: RectificationArgs,
     #[command(flatten)]
     prior: PriorArgs,
+    #[command(flatten)]
+    prior_topic: PriorTopicArgs,
     /// Steadies still surfaces: where the image does not change, disparities are averaged with earlier frames, weighted by confidence.
     /// Confidence, validity, raw and the right view's map are not averaged
     #[arg(long)]
@@ -167,7 +170,7 @@ impl Args {
             right: path(self.right.as_deref().unwrap_or(&self.left)),
             mask: self.mask.as_deref().map(path),
             calibration: input.calibration_files(),
-            prior: self.prior.file().map(path),
+            prior: self.prior.file().map(path).or_else(|| self.prior_topic.prior_topic.clone()),
             output: Some(path(&self.output)),
         }
     }
@@ -214,11 +217,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let films: Vec<_> = frames.films().map(|(film, complaint)| (film.to_owned(), complaint)).collect();
     // The first frame determines the range, and the size that all later frames must have.
     let (first, frames) = pipeline::patiently(move || (frames.next(), frames))?;
-    let FramePair { name, header, pair } =
+    let FramePair { name, header, cloud, pair } =
         first.ok_or_else(|| Error::read(&args.left, "contains no frame"))??;
     let sign = Sign::default();
     let cameras = args.maps.also.take_cameras();
-    let prior_need = known::need(&args.prior)?;
+    let prior_need = known::need(&args.prior, &args.prior_topic)?;
     let takes_rig = takes_cameras(args) || prior_need.is_some();
     let beside = first_image
         .as_deref()
@@ -257,10 +260,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let view = PriorView { size: input.pair.size(), sign, rig: input.as_taken(known) };
     let window = region.as_ref().map(|region| region.window().clone());
-    let priors = FramePriors::new(&args.prior, view, window)?;
+    let priors = FramePriors::new(&args.prior, &args.prior_topic, view, window)?;
     if args.dry_run {
         let (width, height) = region.as_ref().map_or(input.pair.size(), |region| region.window().size());
-        let plan = Plan::new(width, height, input.range, &method)?.with_prior(args.prior.file().is_some());
+        let plan = Plan::new(width, height, input.range, &method)?
+            .with_prior(args.prior.file().is_some() || args.prior_topic.prior_topic.is_some());
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
     let sigma = Sigma::for_method(&method);
@@ -294,7 +298,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let pipeline = Pipeline { matcher, range, region, files, rectified, recalibrate, quiet: args.quiet };
     let known = input.calibration().and_then(|known| Rectification::of_rectified(known, size).ok());
     let rectifier = Rectifier::new(input.rectification, known, range, recalibrate);
-    let first = FramePair { name, header, pair: input.pair };
+    let first = FramePair { name, header, cloud, pair: input.pair };
     let ended = pipeline.run(first, frames, rectifier, priors, &mut sink);
     if !args.quiet {
         for (film, complaint) in &films {
@@ -315,11 +319,14 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 /// Opens LEFT if it is a recording.
 fn open_recording(args: &Args) -> Result<Option<Recorded>> {
     let (left, reader) = (args.left.clone(), args.reading.reader());
-    let Args { recording, .. } = args;
+    let (recording, clouds) = (&args.recording, args.prior_topic.prior_topic.as_deref());
     let is_one = !is_printed(&left) && Recorded::is(&left);
     if !is_one {
-        let flags =
-            [("--topics", recording.topics.is_some()), ("--tolerance", recording.tolerance.is_some())];
+        let flags = [
+            ("--topics", recording.topics.is_some()),
+            ("--tolerance", recording.tolerance.is_some()),
+            (PRIOR_TOPIC, clouds.is_some()),
+        ];
         return match flags.into_iter().find(|(_, given)| *given) {
             Some((flag, _)) => {
                 Err(Failure::usage(flag, "only applies to a recording, but LEFT is not one; remove it"))
@@ -338,8 +345,8 @@ fn open_recording(args: &Args) -> Result<Option<Recorded>> {
             return Err(Failure::usage(flag, reason));
         }
     }
-    let recording = recording.clone();
-    let opened = pipeline::patiently(move || Recorded::open(&left, &recording, reader))??;
+    let (recording, clouds) = (recording.clone(), clouds.map(str::to_owned));
+    let opened = pipeline::patiently(move || Recorded::open(&left, &recording, clouds.as_deref(), reader))??;
     Ok(Some(opened))
 }
 

@@ -12,6 +12,7 @@ use mrfgs::image::Pair;
 use mrfgs::options::DisparityRange;
 use mrfgs::region::Region;
 use mrfgs::{Frame, Matched, Matcher, Prior};
+use mrfgs_ros::messages::Stamp;
 use serde::Serialize;
 
 use crate::args::Sign;
@@ -19,11 +20,11 @@ use crate::failure::{Failure, Result};
 use crate::outputs::{Files, MatchRecord};
 use crate::pairs::input;
 use crate::progress::Counter;
+use crate::sequences::known::{self, CloudDoubt, FramePriors};
 use crate::sequences::{FramePair, Frames, Rectifier, turned};
 use crate::text::plural;
 use crate::{console, remedy, stop};
 
-use super::known::FramePriors;
 use super::writer::{MatchedFrame, Sink};
 
 /// Frames queued between two steps, enough to keep both busy.
@@ -84,11 +85,12 @@ impl Pipeline {
         let mut bar = Counter::of_frames(frames.len(), self.quiet);
         let (sender, receiver) = sync_channel(WAITING);
         let turn = rectifier.followed(&first.pair)?;
-        let prior = priors.of(&first.name)?;
+        let mut clouds_told = [self.quiet; 2];
+        let prior = prior_of(&priors, &first, &mut clouds_told)?;
         let follow = priors.follow();
         let told = first.pair.doubts().each_ref().map(|doubt| self.quiet || doubt.is_some());
         // Not joined, as it may wait for standard input forever.
-        thread::spawn(move || read(frames, rectifier, &priors, told, &sender));
+        thread::spawn(move || read(frames, rectifier, &priors, [told, clouds_told], &sender));
         let (found, to_write) = sync_channel::<MatchedFrame>(WAITING);
         let (matched, written) = thread::scope(|scope| {
             let writing = scope.spawn(|| write(to_write, sink, &mut bar));
@@ -173,14 +175,12 @@ impl Pipeline {
             told.note = note.or(told.note.take());
             told.turn = turn.or(told.turn);
             // Once, as it may hold for all frames.
-            let is_doubt = |warning: &Warning| matches!(warning, Warning::Contradicted { .. });
             if !doubted
                 && !follow
-                && matched.prior.is_some()
-                && let Some(doubt) = matched.warnings().into_iter().find(is_doubt)
+                && let Some(doubt) = known::contradicted(&matched)
             {
                 doubted = true;
-                console::say(&format!("warning: frame {name}: {}", remedy::warning(&doubt, &remedy::FLAGS)));
+                console::say(&format!("warning: frame {name}: {doubt}"));
             }
             if let Some(region) = region {
                 matched.maps = region.maps_of(&matched.maps);
@@ -273,7 +273,7 @@ fn read(
     frames: Frames,
     mut rectifier: Rectifier,
     priors: &FramePriors,
-    mut told: [bool; 2],
+    [mut told, mut clouds_told]: [[bool; 2]; 2],
     to: &SyncSender<NextFrame>,
 ) {
     for frame in frames {
@@ -283,10 +283,10 @@ fn read(
                 input::warn([Warning::Damaged { doubt: doubt.clone() }]);
             }
         }
-        let rectified = |FramePair { name, header, pair }: FramePair| {
-            let (pair, turn) = rectifier.rectified(pair)?;
-            let prior = priors.of(&name)?;
-            Ok(ReadyFrame { frame: FramePair { name, header, pair }, turn, prior })
+        let rectified = |frame: FramePair| {
+            let prior = prior_of(priors, &frame, &mut clouds_told)?;
+            let (pair, turn) = rectifier.rectified(frame.pair)?;
+            Ok(ReadyFrame { frame: FramePair { pair, ..frame }, turn, prior })
         };
         let frame = frame.map_err(Failure::from).and_then(rectified);
         let failed = frame.is_err();
@@ -294,6 +294,26 @@ fn read(
             return;
         }
     }
+}
+
+/// What is known of a frame. Says once that a frame has no cloud, and once why a cloud cannot be used, unless that was `told`.
+fn prior_of(priors: &FramePriors, frame: &FramePair, told: &mut [bool; 2]) -> Result<Option<Arc<Prior>>> {
+    let cloud = frame.cloud.as_ref().map(|cloud| (cloud.data.as_slice(), cloud.encoding));
+    let stamp = frame.header.as_ref().map_or_else(Stamp::default, |header| header.stamp);
+    match priors.of_cloud(cloud, stamp) {
+        Ok(Some(prior)) => return Ok(Some(prior)),
+        Ok(None) => {}
+        Err(doubt) => {
+            let (kind, doubt) = match doubt {
+                CloudDoubt::Missing(doubt) => (0, doubt),
+                CloudDoubt::Unusable(doubt) => (1, doubt),
+            };
+            if !std::mem::replace(&mut told[kind], true) {
+                console::say(&format!("warning: {doubt}"));
+            }
+        }
+    }
+    priors.of(&frame.name)
 }
 
 /// Writes the frames that arrive. Returns how many were written.
