@@ -13,6 +13,7 @@ const SCENES: [&str; 3] = ["slanted", "thin", "repetitive"];
 /// Each frame is measured, because they show different scenes.
 const RANGE: &str = "--max-disparity 23 --device cpu --set measure-every=1";
 const START: u64 = 1_700_000_000_000_000_000;
+const SECOND: u64 = 1_000_000_000;
 /// Nanoseconds between two frames.
 const STEP: u64 = 50_000_000;
 
@@ -681,7 +682,6 @@ fn the_points_of_a_lidar_are_known() {
     let (plain, with) = (alone(""), alone("--prior scan.xyz --prior-pose lidar.txt"));
     assert!(plain != with, "control: the points matter");
     // Three frames with a second between them. The nearest cloud counts, and the third frame has none.
-    const SECOND: u64 = 1_000_000_000;
     let mut messages = Vec::new();
     for n in 0..3 {
         for (view, side) in ["left", "right"].into_iter().enumerate() {

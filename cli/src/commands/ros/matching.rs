@@ -113,7 +113,9 @@ impl<'a> Matching<'a> {
         match self.published(&arrived, infos, to) {
             Ok(doubts) => {
                 log.published(&arrived);
-                doubts.iter().for_each(|doubt| log.doubted(doubt));
+                for doubt in &doubts {
+                    log.doubted(doubt);
+                }
             }
             Err(Failure::Stopped(_)) => {}
             Err(failure @ Failure::Usage(_)) => return Err(failure),
