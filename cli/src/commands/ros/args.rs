@@ -88,16 +88,16 @@ pub(crate) struct Args {
     pub(super) numbers: CameraArgs,
     #[command(flatten)]
     pub(super) rectification: RectificationArgs,
-    #[command(flatten)]
-    pub(super) prior: PriorArgs,
-    #[command(flatten)]
-    pub(super) prior_topic: PriorTopicArgs,
     /// Steadies still surfaces: where the image does not change, disparities are averaged with earlier frames, weighted by confidence
     #[arg(long)]
     pub(super) steady: bool,
     /// Corrects the frames if their matches show that the right camera has turned since the calibration
     #[arg(long)]
     pub(super) recalibrate: bool,
+    #[command(flatten)]
+    pub(super) prior: PriorArgs,
+    #[command(flatten)]
+    pub(super) prior_topic: PriorTopicArgs,
     #[command(flatten)]
     pub(super) also: AlsoArgs,
     /// Prints errors only
