@@ -169,8 +169,8 @@ impl PriorArgs {
     /// How the points of clouds from a topic become priors of a view.
     pub(crate) fn points(&self, view: PriorView) -> Result<CloudPoints> {
         self.check_sigma()?;
-        let reason = "needs the unit of the baseline, as points are in metres in ROS; add an entry `unit` to the calibration: mm, cm or m, or \
-                      add it to --baseline";
+        let reason = "needs the unit of the baseline, as points are in metres in ROS; add an entry `unit` to the calibration: mm, cm or m, \
+                      or add it to --baseline";
         let needed = || Failure::usage(PRIOR_TOPIC, reason);
         let rig = view.rig.filter(|rig| rig.unit().millimetres().is_some()).ok_or_else(needed)?;
         let pose = self.prior_pose.as_deref().map(pose::read).transpose()?;

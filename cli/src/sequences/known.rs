@@ -103,8 +103,8 @@ impl FramePriors {
         let Some((message, encoding)) = cloud else {
             let within = SAME_TIME as f64 / 1e9;
             return Err(CloudDoubt::Missing(format!(
-                "no cloud of {topic} is within {within} s of the left image at {stamp}; such images are matched without one, and the times in \
-                 the headers must be of the same clock"
+                "no cloud of {topic} is within {within} s of the left image at {stamp}; such images are matched without one, and the times \
+                 in the headers must be of the same clock"
             )));
         };
         let unusable = |reason| CloudDoubt::Unusable(format!("a cloud of {topic} is not used: {reason}"));

@@ -37,8 +37,8 @@ Examples:
 /// The flag `--prior` of nodes.
 const PRIOR: &str = "Disparities that are known: a file for all frames, or `last` for the frame before";
 const PRIORS: &str = "\
-Files are as for `mrfgs match`. With `last`, the disparities measured in a frame are known in the next: for cameras that stand still, whose \
-maps then flicker less.";
+Files are as for `mrfgs match`. With `last`, the disparities measured in a frame are known in the next: for cameras that stand still, \
+whose maps then flicker less.";
 
 /// Match live images of two cameras in ROS 2
 ///

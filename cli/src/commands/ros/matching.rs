@@ -75,7 +75,7 @@ impl<'a> Matching<'a> {
             args.rectification.options_if(false)?;
         }
         if args.prior.file().is_some_and(Path::is_dir) {
-            let reason = "is a folder, but live frames have no names; give a file for all frames, or the topic of a lidar with --prior-topic";
+            let reason = "is a folder, but live frames have no names; give a file for all frames, or a lidar's topic with --prior-topic";
             return Err(Failure::usage("--prior", reason));
         }
         let matcher = Matcher::builder().method(method).execution(execution).build()?;
