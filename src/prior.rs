@@ -17,12 +17,14 @@ use crate::error::{Error, Result};
 use crate::image::{Plane, Rect};
 use crate::maps::{FRACTION, Maps, flag};
 use crate::options::MAX_DISPARITY;
+use serde::Serialize;
 
 /// Smallest and largest standard deviation, in px; others are set to these.
 const SIGMAS: [f64; 2] = [1.0 / 16.0, 255.0];
 
 /// How a prior is used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum PriorKind {
     /// Sparse, exact points.
     Points,
@@ -93,11 +95,11 @@ impl PriorPoint {
 }
 
 /// How much of a prior a match has used.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PriorUse {
     /// How it was used.
     pub kind: PriorKind,
-    /// Number of pixels for which a disparity was given.
+    /// Number of pixels for which a disparity was given, at the size of the match, which may be half of that of the pair.
     pub given: usize,
     /// Number of these that their neighbours contradict; they were dropped.
     pub dropped: usize,

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use mrfgs::maps::{FRACTION, flag, has_disparity};
 use mrfgs::options::{DisparityRange, Method};
+use mrfgs::prior::PriorUse;
 use mrfgs::rectification::Trust;
 use mrfgs::{Matched, Timing};
 use serde::Serialize;
@@ -53,6 +54,9 @@ pub(crate) struct MatchRecord<'a> {
     moved_up: f64,
     /// How much the left and the right view were smoothed, in pixels.
     smoothed: [f64; 2],
+    /// How much of a prior was used, with one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    prior: Option<PriorUse>,
     iterations: u32,
     seconds: f64,
     /// Milliseconds by stage and level, if measured.
@@ -94,6 +98,7 @@ impl<'a> MatchRecord<'a> {
             tiles: matched.tiles.count(),
             moved_up: f64::from(matched.conditioning.offset) / f64::from(FRACTION),
             smoothed: matched.conditioning.smoothing,
+            prior: matched.prior,
             iterations: matched.iterations,
             seconds: time.as_secs_f64(),
             stages: matched.timings.iter().map(|t| (stage_and_level(t), ms(t.time))).collect(),

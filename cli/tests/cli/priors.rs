@@ -51,6 +51,13 @@ fn a_point_cloud_is_seen_by_the_left_camera() {
     assert!(said.contains(&format!("{} points of the prior", points.len())), "{said}");
     assert!(wrong(&folder) < 0.2 * before, "{before} %, then {} %", wrong(&folder));
     assert!(map != plain);
+    run(&folder, &format!("{MATCH} --prior scan.xyz --json map.json")).succeeded();
+    let record: Value = serde_json::from_slice(&fs::read(folder.join("map.json")).unwrap()).unwrap();
+    assert_eq!(
+        (&record["prior"]["kind"], &record["prior"]["given"]),
+        (&"points".into(), &points.len().into())
+    );
+    assert!(record["prior"]["trust"].as_f64().unwrap() > 0.9, "{}", record["prior"]);
 
     // A lidar looks along x, with y to the left and z up, from 0.3 m above and 1 m behind.
     let scan: Vec<_> = points.iter().map(|[x, y, z]| [z + 1.0, -x, -y - 0.3]).collect();

@@ -108,8 +108,8 @@ pub(crate) struct Args {
     /// without a calibration: `matches`, `agreeing`, `median` and `percentile95` of the row errors in pixels, `coverage` and
     /// `off_one_plane` from 0 to 1), `region` (first column and row in LEFT, with --roi), `width`, `height`, `sign`, `range` (`min`,
     /// `max`), `labels`, `method` (every key), `ran_on`, `driver` (of the device), `note` (why another device was used), `tiles`,
-    /// `moved_up` (shift of the right view in pixels), `smoothed` (standard deviations for the left and the right view, in pixels),
-    /// `iterations` and `seconds` (of the match). `density` is the share of pixels with a disparity (%), the sum of `measured` and
+    /// `moved_up` (shift of the right view in pixels), `smoothed` (standard deviations for the left and the right view, in pixels), `prior`
+    /// (`kind`, `given` and `dropped` pixels, `trust` from 0 to 1; with --prior), `iterations` and `seconds` (of the match). `density` is the share of pixels with a disparity (%), the sum of `measured` and
     /// `filled`. `mean_confidence` averages over measured pixels.
     #[arg(long, value_name = "FILE", help_heading = "More outputs")]
     json: Option<PathBuf>,
