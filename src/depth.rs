@@ -11,6 +11,8 @@ use crate::image::calib::{Calibration, Camera, Unit};
 use crate::image::cloud::{Cloud, Point, PointFrame};
 use crate::image::{Image, Plane};
 use crate::maps::{FRACTION, Maps};
+use crate::options::MAX_DISPARITY;
+use crate::prior::{Prior, PriorPoint};
 use crate::registration;
 
 /// A calibrated pair of cameras, rectified.
@@ -116,6 +118,29 @@ impl Rig {
         let [x, y, z] = from_original.map_or(point, |matrix| rotated(&transposed(&matrix), point));
         let seen = [x * fx / z + cx, y * fy / z + cy, self.disparity(z)];
         (z > 0.0 && seen.iter().all(|v| v.is_finite())).then_some(seen)
+    }
+
+    /// What is known of a left view of (width, height) pixels that shows these points, which are in the frame of [`Rig::point`] and in the
+    /// unit of the baseline. All have the same standard deviation of their disparities, in px. Points behind the camera or beyond
+    /// [`MAX_DISPARITY`] are left out.
+    ///
+    /// # Errors
+    /// The errors of [`Prior::points`].
+    pub fn prior(
+        &self,
+        size: (usize, usize),
+        points: impl IntoIterator<Item = [f64; 3]>,
+        sigma: f64,
+    ) -> Result<Prior> {
+        let mut count = 0_usize;
+        let seen = points.into_iter().inspect(|_| count += 1).filter_map(|point| self.seen(point));
+        let seen = seen.filter(|[.., d]| d.abs() <= f64::from(MAX_DISPARITY));
+        let points: Vec<_> = seen.map(|[x, y, disparity]| PriorPoint { x, y, disparity, sigma }).collect();
+        if points.is_empty() && count > 0 {
+            let reason = format!("none of the {count} points of the prior is in front of the camera");
+            return Err(Error::Mismatch(reason));
+        }
+        Prior::points(size, points)
     }
 
     /// The depths of a map of disparities in pixels; +infinity where there is no depth.

@@ -11,8 +11,6 @@
 //!
 //! Where the images contradict a prior, it counts less: see [`PriorUse::trust`].
 
-#[cfg(feature = "cameras")]
-use crate::depth::Rig;
 use crate::error::{Error, Result};
 use crate::image::{Plane, Rect};
 use crate::maps::{FRACTION, Maps, flag};
@@ -156,31 +154,6 @@ impl Prior {
             )));
         }
         Ok(prior)
-    }
-
-    /// The points of a scene that a left view of (width, height) pixels sees: x to the right, y down, z forward, in the frame of
-    /// [`Rig::point`] and the unit of the baseline. All have the same standard deviation of their disparities, in px. Points behind the
-    /// camera or beyond [`MAX_DISPARITY`] are left out.
-    ///
-    /// # Errors
-    /// The errors of [`Self::points`].
-    #[cfg(feature = "cameras")]
-    pub fn scene(
-        rig: &Rig,
-        size: (usize, usize),
-        points: impl IntoIterator<Item = [f64; 3]>,
-        sigma: f64,
-    ) -> Result<Self> {
-        let mut count = 0_usize;
-        let seen = points.into_iter().inspect(|_| count += 1).filter_map(|point| rig.seen(point));
-        let seen = seen.filter(|[.., d]| d.abs() <= f64::from(MAX_DISPARITY));
-        let points: Vec<_> = seen.map(|[x, y, disparity]| PriorPoint { x, y, disparity, sigma }).collect();
-        if points.is_empty() && count > 0 {
-            return Err(Error::Mismatch(format!(
-                "none of the {count} points of the prior is in front of the camera"
-            )));
-        }
-        Self::points(size, points)
     }
 
     /// A map of disparities in px, not finite where nothing is known, all with the same standard deviation in px.

@@ -228,11 +228,11 @@ mod tests {
     #[test]
     fn commands_have_few_flags() {
         let caps = [
-            ("match", 32),
+            ("match", 34),
             ("rectify", 9),
             ("depth", 17),
-            ("sequence", 36),
-            ("ros", 27),
+            ("sequence", 42),
+            ("ros", 33),
             ("batch", 21),
             ("evaluate", 15),
             ("evaluate map", 10),

@@ -201,7 +201,7 @@ impl CloudPoints {
     /// The prior of these points.
     pub(crate) fn prior(&self, points: impl IntoIterator<Item = [f64; 3]>) -> mrfgs::Result<Prior> {
         let placed = |point| self.pose.map_or(point, |pose| pose.moved(point)).map(|v| v * self.scale);
-        Prior::scene(&self.rig, self.size, points.into_iter().map(placed), self.sigma)
+        self.rig.prior(self.size, points.into_iter().map(placed), self.sigma)
     }
 }
 

@@ -163,7 +163,7 @@ fn a_node_knows_points_and_its_last_map() {
     let data = points.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
     let camera = Camera { focal_length: [300.0; 2], principal_point: [119.5, 89.5] };
     let rig = Rig::new(&Calibration::of_cameras(camera, 0.12, Unit::Metre)).unwrap();
-    let prior = mrfgs::Prior::scene(&rig, (240, 180), points.iter().map(|point| point.map(f64::from)), 0.25);
+    let prior = rig.prior((240, 180), points.iter().map(|point| point.map(f64::from)), 0.25);
     let mut matcher =
         Matcher::builder().method(Method::preset("fast").unwrap()).device("cpu").build().unwrap();
     let range = options::DisparityRange::new(0, 47).unwrap();
