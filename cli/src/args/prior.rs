@@ -239,7 +239,7 @@ impl PriorFile<'_> {
     /// Reads the prior for a view, whose cameras must be known if they are needed.
     pub(crate) fn read(&self, view: PriorView) -> Result<Arc<Prior>> {
         let is_cloud = is_cloud(self.path);
-        if self.pose.is_some() && !is_cloud {
+        if self.pose.is_some() && !is_cloud && self.path.exists() {
             let reason =
                 format!("only applies to a point cloud, which {} is not; remove it", self.path.display());
             return Err(Failure::usage(self.names.pose, reason));

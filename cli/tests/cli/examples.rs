@@ -62,6 +62,18 @@ const NOT_RUN: &[(&str, &str)] = &[
         "needs cameras; scripts/node tries it",
     ),
     ("mrfgs sequence drive.mcap ws://localhost:8765 --also depth,points", "waits for a viewer"),
+    (
+        "mrfgs match left.png right.png map.pfm --rectify --calib stereo.yml --prior scan.pcd --prior-pose lidar.txt",
+        "takes a lidar; tests of priors have the same flags",
+    ),
+    (
+        "mrfgs sequence left right maps --rectify --calib stereo.yml --prior scans --prior-pose lidar.txt",
+        "takes a lidar; tests of priors have the same flags",
+    ),
+    (
+        "mrfgs match left.png right.png map.pfm --rectify --calib cameras.txt --calib images.txt --prior points3D.txt --prior-pose images.txt",
+        "takes a reconstruction of COLMAP",
+    ),
     ("mrfgs devices", "depends on the machine"),
     ("mrfgs match left.png right.png d.pfm --device gpu", "needs a GPU"),
     ("mrfgs match left.png right.png d.pfm --device 0", "needs a device"),
@@ -86,6 +98,10 @@ const NOT_RUN: &[(&str, &str)] = &[
     ),
     ("mrfgs_image left = {left_pixels, left_stride, width, height, MRFGS_FORMAT_RGB8}, right = ...;", "C"),
     ("#include <mrfgs.h>", "C"),
+    (
+        "mrfgs_prior_point points[] = {{120, 80, 31.5, 0}, ...}; /* x, y, disparity, standard deviation; 0: the usual one */",
+        "C",
+    ),
     ("const char *path = \"stereo.yml\";                        /* ROS has two */", "C"),
     ("import { createMatcher } from '@mrfgs/wasm';", "JavaScript"),
 ];

@@ -44,7 +44,7 @@ Examples:
   # With points of a lidar in the left view, as lines of x,y,disparity:
   mrfgs match l.png r.png d.pfm --max-disparity 90 --prior points.csv
   # With the points of a lidar, and where it stands:
-  mrfgs match l.png r.png d.pfm --calib calib.txt --prior scan.pcd --prior-pose lidar.txt
+  mrfgs match l.png r.png d.pfm --calib c --prior scan.pcd --prior-pose t.txt
   # Points as LAZ, in the frame of the left camera before rectification:
   mrfgs match l.png r.png d.pfm --rectify --calib c --also points-original.laz";
 

@@ -46,11 +46,11 @@ Examples:
   mrfgs sequence drive.mcap maps --also depth-mm
   mrfgs sequence drive.mcap found.mcap --also depth,points
   # With the lidar of the recording, and where it stands:
-  mrfgs sequence drive.mcap maps --prior-topic /lidar/points --prior-pose lidar.txt
+  mrfgs sequence drive.mcap maps --prior-topic /lidar --prior-pose t.txt
   # Shown live in Foxglove:
   mrfgs sequence drive.mcap ws://localhost:8765 --also depth,points
   # With the scans of a lidar, one per frame, and where it stands:
-  mrfgs sequence left right maps --calib c.yml --prior scans --prior-pose lidar.txt
+  mrfgs sequence left right maps --calib c --prior scans --prior-pose t.txt
   # Cameras that stand still:
   mrfgs sequence left.mp4 right.mp4 disparity.mp4 --prior last
   # Raw images and a calibration, with depth in millimetres:
