@@ -190,7 +190,7 @@ describe('views', () => {
             }
             await visit.tab.keyboard.press('Tab');
         }
-        assert.deepEqual(order, ['left-file', 'swap', 'right-file', 'open-camera', 'mixed', 'slanted', 'thin', 'steep', 'preset', 'size', 'range', 'device', 'match']);
+        assert.deepEqual(order, ['left-file', 'swap', 'right-file', 'add-prior', 'open-camera', 'mixed', 'slanted', 'thin', 'steep', 'preset', 'size', 'range', 'device', 'match']);
         await visit.tab.focus('[data-scene=slanted]');
         await visit.changed(() => visit.tab.keyboard.press('Enter'));
         await visit.state('done');
