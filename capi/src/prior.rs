@@ -1,4 +1,4 @@
-//! What is known of a scene, in C's memory.
+//! Priors in C's memory: disparities of the left image that are known before the match.
 
 use std::cell::Cell;
 

@@ -48,7 +48,8 @@ impl Matcher {
         self.device.clone()
     }
 
-    /// Matches `pair` over `range`, with what is known of it. `progress` is called with the stage and the fraction of the work done, and returns whether to continue.
+    /// Matches `pair` over `range`, with what is known of it. `progress` is called with the stage and the fraction of the work done, and
+    /// returns whether to continue.
     /// With `half`, the pair is matched at half size. A pair that needs more than [`MEMORY`] is matched in tiles.
     ///
     /// # Errors

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use mrfgs::image::calib::{Calibration, Camera, Unit};
 
-/// What needs the cameras.
+/// Why the cameras are read: an output or a prior that takes them.
 pub(crate) struct CameraNeed {
     /// Its name in messages, a flag.
     pub(crate) flag: String,

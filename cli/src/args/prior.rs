@@ -62,7 +62,7 @@ impl LengthUnit {
     }
 }
 
-/// What is known before a match.
+/// The flags of a prior: disparities of the left view that are known before the match.
 #[derive(clap::Args, Clone)]
 #[command(next_help_heading = "What is known of the scene")]
 pub(crate) struct PriorArgs {
@@ -239,6 +239,7 @@ impl PriorFile<'_> {
     /// Reads the prior for a view, whose cameras must be known if they are needed.
     pub(crate) fn read(&self, view: PriorView) -> Result<Arc<Prior>> {
         let is_cloud = is_cloud(self.path);
+        // A file that does not exist is reported when it is read.
         if self.pose.is_some() && !is_cloud && self.path.exists() {
             let reason =
                 format!("only applies to a point cloud, which {} is not; remove it", self.path.display());

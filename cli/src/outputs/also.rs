@@ -160,7 +160,7 @@ impl Also {
         matches!(self.kind, Kind::Millimetres | Kind::Registered { millimetres: true })
     }
 
-    /// What it needs the cameras for.
+    /// The need of this output for the cameras.
     pub(crate) fn need(&self) -> CameraNeed {
         CameraNeed { flag: self.flag(), unit: self.takes_unit() }
     }

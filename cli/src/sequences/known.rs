@@ -1,4 +1,4 @@
-//! What is known of each frame before it is matched.
+//! The prior of each frame of a sequence or of a live node: a file, the cloud of a lidar, or the frame before.
 
 use std::collections::HashMap;
 use std::ffi::OsStr;
@@ -30,14 +30,15 @@ pub(crate) enum CloudDoubt {
 
 /// The priors of the frames.
 pub(crate) struct FramePriors {
-    from: From,
+    source: PriorSource,
     flags: PriorArgs,
     view: PriorView,
     /// The part of the view that is matched; `None` for all of it.
     window: Option<Rect>,
 }
 
-enum From {
+/// Where the priors come from.
+enum PriorSource {
     Nothing,
     /// The same for all frames.
     All(Arc<Prior>),
@@ -57,33 +58,33 @@ impl FramePriors {
         view: PriorView,
         window: Option<Rect>,
     ) -> Result<Self> {
-        let from = match flags.file() {
+        let source = match flags.file() {
             None => match &topic.prior_topic {
-                Some(topic) => From::Topic(topic.clone(), Box::new(flags.points(view)?)),
-                None => From::Nothing,
+                Some(topic) => PriorSource::Topic(topic.clone(), Box::new(flags.points(view)?)),
+                None => PriorSource::Nothing,
             },
-            Some(path) if is_last(path) => From::Last,
-            Some(path) if path.is_dir() => From::Folder(by_name(path)?),
-            Some(_) => flags.read(view)?.map_or(From::Nothing, From::All),
+            Some(path) if is_last(path) => PriorSource::Last,
+            Some(path) if path.is_dir() => PriorSource::Folder(by_name(path)?),
+            Some(_) => flags.read(view)?.map_or(PriorSource::Nothing, PriorSource::All),
         };
-        let mut priors = Self { from, flags: flags.clone(), view, window };
-        if let From::All(prior) = &priors.from {
-            priors.from = From::All(priors.part(Arc::clone(prior)));
+        let mut priors = Self { source, flags: flags.clone(), view, window };
+        if let PriorSource::All(prior) = &priors.source {
+            priors.source = PriorSource::All(priors.part(Arc::clone(prior)));
         }
         Ok(priors)
     }
 
     /// Whether each frame follows from the one before.
     pub(crate) fn follow(&self) -> bool {
-        matches!(self.from, From::Last)
+        matches!(self.source, PriorSource::Last)
     }
 
     /// The prior of the frame called `name`, if it has one by its name.
     pub(crate) fn of(&self, name: &str) -> Result<Option<Arc<Prior>>> {
-        match &self.from {
-            From::Nothing | From::Last | From::Topic(..) => Ok(None),
-            From::All(prior) => Ok(Some(Arc::clone(prior))),
-            From::Folder(files) => {
+        match &self.source {
+            PriorSource::Nothing | PriorSource::Last | PriorSource::Topic(..) => Ok(None),
+            PriorSource::All(prior) => Ok(Some(Arc::clone(prior))),
+            PriorSource::Folder(files) => {
                 let Some(file) = files.get(name) else { return Ok(None) };
                 Ok(Some(self.part(self.flags.read_file(file, self.view)?)))
             }
@@ -99,7 +100,7 @@ impl FramePriors {
         cloud: Option<(&[u8], Encoding)>,
         stamp: Stamp,
     ) -> std::result::Result<Option<Arc<Prior>>, CloudDoubt> {
-        let From::Topic(topic, seen) = &self.from else { return Ok(None) };
+        let PriorSource::Topic(topic, seen) = &self.source else { return Ok(None) };
         let Some((message, encoding)) = cloud else {
             let within = SAME_TIME as f64 / 1e9;
             return Err(CloudDoubt::Missing(format!(

@@ -58,7 +58,7 @@ struct RigState {
     messages: Messages,
     steady: Option<Steady>,
     priors: FramePriors,
-    /// What the last frame has shown, if that is known in the next.
+    /// The map of the last frame as the prior of the next, with `--prior last`.
     last: Option<Arc<Prior>>,
     /// The corrections of the last measured frame, and the frames that they have been used for.
     corrections: Option<(Conditioning, u32)>,

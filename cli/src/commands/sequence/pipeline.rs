@@ -296,7 +296,8 @@ fn read(
     }
 }
 
-/// What is known of a frame. Says once that a frame has no cloud, and once why a cloud cannot be used, unless that was `told`.
+/// The prior of a frame, from the cloud at its time or by its name. Warns of the first frame without a cloud and of the first cloud that
+/// cannot be used; `told` keeps which of the two has been said.
 fn prior_of(priors: &FramePriors, frame: &FramePair, told: &mut [bool; 2]) -> Result<Option<Arc<Prior>>> {
     let cloud = frame.cloud.as_ref().map(|cloud| (cloud.data.as_slice(), cloud.encoding));
     let stamp = frame.header.as_ref().map_or_else(Stamp::default, |header| header.stamp);
