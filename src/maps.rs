@@ -101,6 +101,35 @@ impl Maps {
         Self { raw: disparity.clone(), disparity, confidence, validity, right: None }
     }
 
+    /// Maps of (width, height) pixels that hold zeros, with that of the right view if `right`: parts of them can be
+    /// [pasted](Self::paste).
+    #[must_use]
+    pub fn blank((width, height): (usize, usize), right: bool) -> Self {
+        let (disparity, bytes) = (Plane::filled(width, height, 0), Plane::filled(width, height, 0));
+        Self {
+            raw: disparity.clone(),
+            confidence: bytes.clone(),
+            right: right.then(|| RightMap { disparity: disparity.clone(), validity: bytes.clone() }),
+            disparity,
+            validity: bytes,
+        }
+    }
+
+    /// Copies `maps`, which have the size of `part`, to that part. The right view's are copied if both have some.
+    ///
+    /// # Panics
+    /// When they have another size, or `part` is not inside.
+    pub fn paste(&mut self, maps: &Self, part: &Rect) {
+        self.disparity.paste(&maps.disparity, part);
+        self.raw.paste(&maps.raw, part);
+        self.confidence.paste(&maps.confidence, part);
+        self.validity.paste(&maps.validity, part);
+        if let (Some(whole), Some(right)) = (&mut self.right, &maps.right) {
+            whole.disparity.paste(&right.disparity, part);
+            whole.validity.paste(&right.validity, part);
+        }
+    }
+
     /// The top left part of (width, height) pixels.
     pub(crate) fn cut_to(self, size: (usize, usize)) -> Self {
         Self {

@@ -106,6 +106,18 @@ pub struct PriorUse {
     pub trust: f64,
 }
 
+impl PriorUse {
+    /// What two blocks of a pair have used together.
+    #[must_use]
+    pub fn sum(one: Option<Self>, other: Option<Self>) -> Option<Self> {
+        let (Some(a), Some(b)) = (one, other) else { return one.or(other) };
+        let kept = |used: &Self| (used.given - used.dropped) as f64;
+        let all = kept(&a) + kept(&b);
+        let trust = if all > 0.0 { (a.trust * kept(&a) + b.trust * kept(&b)) / all } else { a.trust };
+        Some(Self { kind: a.kind, given: a.given + b.given, dropped: a.dropped + b.dropped, trust })
+    }
+}
+
 /// Known disparities of the left view. See the [module](self).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Prior {

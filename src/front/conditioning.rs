@@ -62,6 +62,22 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
 }
 
 impl Conditioning {
+    /// The median of each of the corrections that were `measured` in several parts of a pair, or on several frames of the same cameras;
+    /// none without a measurement.
+    #[must_use]
+    pub fn median(measured: &[Self]) -> Self {
+        let middle = measured.len() / 2;
+        let of = |value: &dyn Fn(&Self) -> f64| {
+            let mut values: Vec<f64> = measured.iter().map(value).collect();
+            values.sort_by(f64::total_cmp);
+            values.get(middle).copied().unwrap_or_default()
+        };
+        Self {
+            offset: of(&|one| f64::from(one.offset)) as i32,
+            smoothing: [0, 1].map(|view| of(&|one| one.smoothing[view])),
+        }
+    }
+
     /// The same corrections for a pair at twice the size.
     pub(super) fn doubled(&self) -> Self {
         Self { offset: 2 * self.offset, smoothing: self.smoothing.map(|sigma| 2.0 * sigma) }

@@ -37,9 +37,11 @@ pub mod check {
 use crate::error::{Error, Purpose, Result};
 use crate::image::Pair;
 use crate::memory;
+use crate::options::{DisparityRange, Method};
 use crate::plan::Plan;
-use crate::watch::Watch;
+use crate::watch::{Followed, Progress, Watch};
 use conditioning::Conditioning;
+use std::ops::ControlFlow;
 
 /// `pair` at the size at which `plan` matches it; a half is computed at once, or on first use.
 fn at_size(pair: &Pair, plan: &Plan, at_once: bool, watch: &mut Watch) -> Result<Pair> {
@@ -66,6 +68,19 @@ pub(crate) fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(
         let found = found.doubled();
         Ok((conditioned.with_full(Some(found.apply(full))), found))
     })
+}
+
+impl Conditioning {
+    /// The corrections that a match of `pair` over the disparities of `range` by `method` measures.
+    ///
+    /// # Errors
+    /// [`Error::Option`] for options out of range, and [`Error::Memory`] when the machine cannot hold it.
+    pub fn measured(pair: &Pair, range: DisparityRange, method: &Method) -> Result<Self> {
+        let (width, height) = pair.size();
+        let plan = Plan::new(width, height, range, method)?;
+        let quiet = &mut |_: Progress| ControlFlow::Continue(());
+        Ok(condition(pair, &plan, &mut Watch::new(quiet, Followed::default()))?.1)
+    }
 }
 
 /// Like [`condition`], with corrections that are known, for `pair` at its own size. If the backend `halves` pairs, the host

@@ -1,6 +1,8 @@
 //! Planes of pixels, and the stereo pair.
 
 #[cfg(feature = "files")]
+mod bands;
+#[cfg(feature = "files")]
 mod both;
 #[cfg(feature = "cameras")]
 pub mod calib;
@@ -219,6 +221,20 @@ impl<T: Clone> Plane<T> {
     pub fn crop(&self, part: &Rect) -> Self {
         let rows: Vec<&[T]> = part.y.clone().map(|y| &self.row(y)[part.x.clone()]).collect();
         Self { width: part.x.len(), height: part.y.len(), data: rows.concat() }
+    }
+
+    /// Copies `values`, which have the size of `part`, to that part.
+    ///
+    /// # Panics
+    /// When they have another size, or `part` is not inside the plane.
+    pub fn paste(&mut self, values: &Self, part: &Rect)
+    where
+        T: Copy,
+    {
+        assert_eq!(values.size(), part.size(), "the values of the part");
+        for (y, row) in part.y.clone().zip(values.data.chunks(values.width.max(1))) {
+            self.row_mut(y)[part.x.clone()].copy_from_slice(row);
+        }
     }
 
     /// The top left part of (width, height) pixels.

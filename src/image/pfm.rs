@@ -39,12 +39,22 @@ pub fn write(path: &Path, plane: &Plane<f32>) -> Result<()> {
 /// The bytes of the file that [`write()`] would write.
 #[must_use]
 pub fn encode(plane: &Plane<f32>) -> Vec<u8> {
-    let mut bytes = format!("Pf\n{} {}\n-1.0\n", plane.width(), plane.height()).into_bytes();
+    let mut bytes = header(plane.size()).into_bytes();
     bytes.reserve_exact(plane.data().len() * 4);
+    encode_rows(plane, &mut bytes);
+    bytes
+}
+
+/// The header of a single-channel file of (width, height) pixels.
+pub(super) fn header((width, height): (usize, usize)) -> String {
+    format!("Pf\n{width} {height}\n-1.0\n")
+}
+
+/// Appends the rows of a plane as the file has them, from the bottom.
+pub(super) fn encode_rows(plane: &Plane<f32>, bytes: &mut Vec<u8>) {
     for y in (0..plane.height()).rev() {
         bytes.extend(plane.row(y).iter().flat_map(|v| v.to_le_bytes()));
     }
-    bytes
 }
 
 const NOT_PFM: &str = "not a PFM file: it does not begin with Pf or PF";

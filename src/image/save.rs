@@ -2,7 +2,7 @@
 //! exists or not.
 
 use std::fs::{self, File};
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
@@ -208,6 +208,13 @@ impl Write for Growing {
 
     fn flush(&mut self) -> io::Result<()> {
         self.to.file().flush()
+    }
+}
+
+/// A device or a pipe may refuse.
+impl Seek for Growing {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.to.file().seek(to)
     }
 }
 

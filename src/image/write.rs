@@ -10,6 +10,7 @@ use super::save::check;
 use super::{Georeference, Plane, pfm, tiff};
 use crate::error::{Error, Reason, Result};
 
+pub use super::bands::{Bands, Level, picture_in_bands};
 pub use super::save::{Growing, no_folder, publish, remove, save};
 #[cfg(feature = "cameras")]
 pub use super::save_cloud::cloud;
@@ -19,7 +20,7 @@ const PNG_SCALE: f32 = 256.0;
 
 /// The format of a disparity map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
+pub(super) enum Format {
     Pfm,
     Png,
     Tiff,
@@ -146,7 +147,7 @@ pub fn picture(path: &Path, picture: &impl Picture) -> Result<()> {
     save(path, &picture.png(path)?)
 }
 
-fn check_float(path: &Path) -> Result<()> {
+pub(super) fn check_float(path: &Path) -> Result<()> {
     match format(path) {
         Ok(Format::Pfm | Format::Tiff) => Ok(()),
         _ => Err(Error::write(path, Reason::of_request("depth maps end in .pfm or .tif (float)"))),
@@ -160,7 +161,7 @@ fn png_extension(path: &Path) -> Result<()> {
     Err(Error::write(path, Reason::of_request("pictures are written as PNG; give a name that ends in .png")))
 }
 
-fn format(path: &Path) -> Result<Format> {
+pub(super) fn format(path: &Path) -> Result<Format> {
     match extension(path).as_deref() {
         Some("pfm") => Ok(Format::Pfm),
         Some("png") => Ok(Format::Png),
@@ -184,7 +185,7 @@ pub(super) fn is_special(path: &Path) -> bool {
 }
 
 /// Disparities in KITTI's format.
-fn png_levels(map: &Plane<f32>) -> std::result::Result<Vec<u16>, String> {
+pub(super) fn png_levels(map: &Plane<f32>) -> std::result::Result<Vec<u16>, String> {
     let level = |&d: &f32| {
         let level = (d * PNG_SCALE).round();
         if !d.is_finite() {

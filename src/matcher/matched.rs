@@ -31,9 +31,11 @@ pub struct Matched {
     pub plan: Plan,
     /// Whether sparse matches found the range.
     pub range_found: bool,
-    /// The tiles of the image: one if it was not cut.
+    /// The tiles of the image: one if it was not cut. Of an image in blocks, those of the block with the most.
     #[doc(hidden)]
     pub tiles: Tiles,
+    /// Number of [blocks](crate::region::Blocks) that were matched one by one: 1 if the image fits in the memory of the method.
+    pub blocks: usize,
     /// The backend that ran the stages, in readable form.
     pub ran_on: String,
     /// The driver of the device, if known; `None` for the CPU path.
@@ -80,6 +82,7 @@ impl Matched {
             plan: tiles.whole().clone(),
             range_found: false,
             tiles: tiles.clone(),
+            blocks: 1,
             ran_on: backend.describe(),
             driver: backend.driver(),
             note: None,

@@ -4,6 +4,7 @@ mod check;
 mod corrections;
 mod following;
 mod frame;
+mod in_blocks;
 mod job;
 mod matched;
 pub mod on_device;
@@ -232,7 +233,13 @@ impl Matcher {
             fits(prior, pair)?;
         }
         let input = (pair, known, prior);
-        let tiles = Tiles::new(&plan)?;
+        let tiles = match Tiles::new(&plan) {
+            // An inspector sees a single match.
+            Err(Error::Budget(BudgetError::NoTileFits { .. })) if inspector.is_none() => {
+                return Box::pin(self.solve_in_blocks(pair, request, observer)).await;
+            }
+            tiles => tiles?,
+        };
         let needed = plan.bytes().div_ceil(1 << 20);
         if inspector.is_some() && needed > plan.method.tiles.memory.into() {
             return Err(BudgetError::Steps { needed }.into());

@@ -203,7 +203,7 @@ fn partition(range: Range<usize>, holds: impl Fn(usize) -> bool) -> Option<usize
 }
 
 /// The split along one side of the image.
-struct Axis {
+pub(crate) struct Axis {
     /// Pixels of the image.
     length: usize,
     /// Pixels of a crop before and after its core, inside the image: multiples of `step`.
@@ -213,8 +213,13 @@ struct Axis {
 }
 
 impl Axis {
-    fn new(length: usize, around: [usize; 2], step: usize) -> Self {
+    pub(crate) fn new(length: usize, around: [usize; 2], step: usize) -> Self {
         Self { length, around: around.map(|pixels| pixels.next_multiple_of(step)), step }
+    }
+
+    /// Pixels of the image.
+    pub(crate) fn length(&self) -> usize {
+        self.length
     }
 
     /// The width that two adjacent crops share.
@@ -223,19 +228,19 @@ impl Axis {
     }
 
     /// The largest useful number of tiles.
-    fn most(&self) -> usize {
+    pub(crate) fn most(&self) -> usize {
         self.length.div_ceil(self.step)
     }
 
     /// Pixels of the largest crop if the image is split evenly into `count` tiles.
-    fn crop(&self, count: usize) -> usize {
+    pub(crate) fn crop(&self, count: usize) -> usize {
         let all = self.length + (count - 1) * self.shared();
         let even = all.div_ceil(count).next_multiple_of(self.step);
         even.max(self.shared() + self.step).min(self.length)
     }
 
     /// Pixels of all crops together if none has more than `crop`.
-    fn cropped(&self, crop: usize) -> usize {
+    pub(crate) fn cropped(&self, crop: usize) -> usize {
         if crop >= self.length {
             return self.length;
         }
@@ -244,7 +249,7 @@ impl Axis {
     }
 
     /// Cores and crops of at most `crop` pixels, as few as possible.
-    fn spans(&self, crop: usize) -> Vec<[Range<usize>; 2]> {
+    pub(crate) fn spans(&self, crop: usize) -> Vec<[Range<usize>; 2]> {
         let [before, after] = self.around;
         let mut spans: Vec<[Range<usize>; 2]> = Vec::new();
         let mut start = 0;

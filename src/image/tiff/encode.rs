@@ -14,7 +14,7 @@ use crate::threads;
 use crate::threads::prelude::*;
 
 /// Most pixels of a plain map. A few programs cannot read tiles and Deflate, which small maps do not need.
-const MAX_PLAIN: usize = 1 << 22;
+pub(in crate::image) const MAX_PLAIN: usize = 1 << 22;
 /// Limit for plain TIFF, whose offsets end at 4 GiB; this leaves room for the tags. Few programs read
 /// BigTIFF, so it is used only if needed.
 const MAX_BYTES: usize = u32::MAX as usize - (1 << 25);
@@ -34,7 +34,7 @@ pub(in crate::image) fn encode(
         annotate(image.encoder(), georeference)?;
         image.write_data(map.data())?;
     } else {
-        write_tiles(&mut file, size, &packed_tiles(map)?, georeference, MAX_BYTES)?;
+        write_tiles(&mut file, size, packed_tiles(map)?, georeference, MAX_BYTES)?;
     }
     Ok(file.into_inner())
 }
@@ -64,25 +64,58 @@ fn align<W: Write + Seek, K: TiffKind>(
     Ok(())
 }
 
+/// Writes a large map to `file` from bands of rows, from the top, of any heights that add up to its own; BigTIFF if the map may exceed
+/// plain TIFF.
+pub(in crate::image) fn write_bands(
+    file: impl Write + Seek,
+    size: (u32, u32),
+    bands: impl Iterator<Item = TiffResult<Plane<f32>>>,
+    georeference: Option<&Georeference>,
+) -> TiffResult<()> {
+    let (width, height) = (size.0 as usize, size.1 as usize);
+    let mut bands = bands.fuse();
+    let (mut rest, mut left) = (Vec::new(), height);
+    let rows = std::iter::from_fn(|| {
+        let wanted = SIDE.min(left) * width;
+        while rest.len() < wanted {
+            match bands.next()? {
+                Ok(band) => rest.extend(band.into_data()),
+                Err(e) => return Some(Err(e)),
+            }
+        }
+        left -= SIDE.min(left);
+        let band = Plane::new(width, wanted / width, rest.drain(..wanted).collect());
+        (wanted > 0).then(|| Ok(packed_tiles(&band)?))
+    });
+    if width * height * size_of::<f32>() > MAX_BYTES {
+        write_directory(TiffEncoder::new_big(file)?, size, rows, georeference)
+    } else {
+        write_directory(TiffEncoder::new(file)?, size, rows, georeference)
+    }
+}
+
 /// Writes a file of tiles; BigTIFF if they exceed `max_bytes`.
 fn write_tiles(
     file: &mut Cursor<Vec<u8>>,
     size: (u32, u32),
-    tiles: &[Vec<u8>],
+    tiles: Vec<Vec<u8>>,
     georeference: Option<&Georeference>,
     max_bytes: usize,
 ) -> TiffResult<()> {
-    if tiles.iter().map(Vec::len).sum::<usize>() > max_bytes {
+    let is_big = tiles.iter().map(Vec::len).sum::<usize>() > max_bytes;
+    let tiles = std::iter::once(Ok(tiles));
+    if is_big {
         write_directory(TiffEncoder::new_big(file)?, size, tiles, georeference)
     } else {
         write_directory(TiffEncoder::new(file)?, size, tiles, georeference)
     }
 }
 
+/// Writes the packed tiles, in groups, and then the tags.
 fn write_directory<W: Write + Seek, K: TiffKind>(
     mut encoder: TiffEncoder<W, K>,
     (width, height): (u32, u32),
-    tiles: &[Vec<u8>],
+    tiles: impl Iterator<Item = TiffResult<Vec<Vec<u8>>>>,
     georeference: Option<&Georeference>,
 ) -> TiffResult<()>
 where
@@ -90,10 +123,12 @@ where
 {
     let mut directory = encoder.image_directory()?;
     let (mut offsets, mut sizes) = (Vec::new(), Vec::new());
-    for tile in tiles {
-        offsets.push(K::convert_offset(directory.write_data(&tile[..])?)?);
-        sizes.push(K::convert_offset(tile.len() as u64)?);
-        align(&mut directory, tile.len())?;
+    for group in tiles {
+        for tile in group? {
+            offsets.push(K::convert_offset(directory.write_data(&tile[..])?)?);
+            sizes.push(K::convert_offset(tile.len() as u64)?);
+            align(&mut directory, tile.len())?;
+        }
     }
     directory.write_tag(Tag::ImageWidth, width)?;
     directory.write_tag(Tag::ImageLength, height)?;
@@ -173,7 +208,7 @@ mod tests {
             let tiles = packed_tiles(&map).unwrap();
             for (max_bytes, big) in [(MAX_BYTES, false), (0, true)] {
                 let mut file = Cursor::new(Vec::new());
-                write_tiles(&mut file, (width as u32, height as u32), &tiles, None, max_bytes).unwrap();
+                write_tiles(&mut file, (width as u32, height as u32), tiles.clone(), None, max_bytes).unwrap();
                 assert_eq!(read(file.get_ref()), (bits.clone(), big), "{width} x {height}");
                 let raster = super::super::decode(file.get_ref(), 1 << 20, None).unwrap();
                 let crate::image::raster::Samples::Float(values) = raster.samples else { panic!("float") };

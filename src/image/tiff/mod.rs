@@ -10,7 +10,7 @@ mod directory;
 mod encode;
 mod geo;
 
-pub(super) use encode::encode;
+pub(super) use encode::{MAX_PLAIN, encode, write_bands};
 
 use std::borrow::Cow;
 

@@ -1,5 +1,9 @@
 //! A region of the left view that is matched alone: the window of both views that it needs, and its part of the maps.
 
+mod blocks;
+
+pub use blocks::Blocks;
+
 use crate::error::{Error, Result};
 use crate::image::{Pair, Rect};
 use crate::maps::Maps;
