@@ -149,7 +149,7 @@ pub fn is_guarded() -> bool {
 }
 
 /// Runs a foreign decoder, and turns its panics into errors of the file.
-fn guarded<T>(decode: impl FnOnce() -> Result<T, ReadError>) -> Result<T, ReadError> {
+pub(super) fn guarded<T>(decode: impl FnOnce() -> Result<T, ReadError>) -> Result<T, ReadError> {
     let before = GUARDED.replace(true);
     let decoded = catch_unwind(AssertUnwindSafe(decode));
     GUARDED.set(before);
@@ -189,7 +189,36 @@ fn plain(text: &str) -> String {
     out
 }
 
-fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Raster<'static>, ReadError> {
+/// (width, height) and orientation of a file of `length` bytes, of which `bytes` are the first: of the image as
+/// stored, by its header alone. `None` for a kind whose header is packed or elsewhere.
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) fn size(
+    bytes: &[u8],
+    max_pixels: u64,
+    length: u64,
+) -> Result<Option<((usize, usize), Orientation)>, ReadError> {
+    let upright = |size| Some((size, Orientation::UPRIGHT));
+    guarded(|| match Kind::detect(bytes) {
+        Some(Kind::Pfm) => Ok(upright(pfm::size(bytes, max_pixels)?.0)),
+        Some(Kind::Npy) => Ok(upright(npy::size(bytes, max_pixels)?)),
+        Some(Kind::Coded(ImageFormat::Jpeg)) => jpeg::size(bytes, max_pixels, length).map(Some),
+        Some(Kind::Coded(format)) => {
+            let mut decoder = decoder(bytes, format, max_pixels, length)?;
+            let (width, height) = decoder.dimensions();
+            Ok(Some(((width as usize, height as usize), orientation(&mut decoder))))
+        }
+        Some(Kind::Npz | Kind::Tiff) => Ok(None),
+        None => Err(unknown(bytes).into()),
+    })
+}
+
+/// The decoder of a file of `length` bytes, whose size is checked.
+fn decoder(
+    bytes: &[u8],
+    format: ImageFormat,
+    max_pixels: u64,
+    length: u64,
+) -> Result<impl ImageDecoder, ReadError> {
     // The decoder unpacks other compressed data of a PNG file before it reports the size.
     let claimed = if format == ImageFormat::Png {
         let (width, height) = png_size(bytes)?;
@@ -202,16 +231,20 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(max_bytes_of(claimed));
     reader.limits(limits);
-    let mut decoder = reader.into_decoder().map_err(coded_reason)?;
+    let decoder = reader.into_decoder().map_err(coded_reason)?;
     let (width, height) = decoder.dimensions();
     let plain = format == ImageFormat::Pnm;
     let per_byte = if plain { MAX_PLAIN_PIXELS_PER_BYTE } else { MAX_PIXELS_PER_BYTE };
-    check_claim((width.into(), height.into()), max_pixels, per_byte, bytes.len())?;
+    check_claim((width.into(), height.into()), max_pixels, per_byte, length)?;
+    Ok(decoder)
+}
+
+fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Raster<'static>, ReadError> {
+    let mut decoder = decoder(bytes, format, max_pixels, bytes.len() as u64)?;
+    let (width, height) = decoder.dimensions();
     // The decoder holds rows and their filtered copies in addition to its pixels.
     let _claim = Claim::new(2 * decoder.total_bytes())?;
-    // Ignore damaged EXIF data, which does not affect the pixels.
-    let exif = decoder.exif_metadata().ok().flatten();
-    let orientation = exif.map_or(Orientation::UPRIGHT, |data| Orientation::of_exif(&data));
+    let orientation = orientation(&mut decoder);
     let (colour, size) = (decoder.color_type(), (width as usize, height as usize));
     let channels = usize::from(colour.channel_count());
     let samples = match usize::from(colour.bytes_per_pixel()) / channels {
@@ -220,6 +253,13 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
         _ => filled::<f32>(decoder)?,
     };
     Ok(Raster { orientation, ..Raster::of(size, channels, samples) })
+}
+
+/// The orientation in the EXIF data of an image.
+fn orientation(decoder: &mut impl ImageDecoder) -> Orientation {
+    // Ignore damaged EXIF data, which does not affect the pixels.
+    let exif = decoder.exif_metadata().ok().flatten();
+    exif.map_or(Orientation::UPRIGHT, |data| Orientation::of_exif(&data))
 }
 
 /// Reads all samples, as values of this type.

@@ -73,10 +73,10 @@ pub(super) fn check_claim(
     (width, height): (u64, u64),
     max_pixels: u64,
     per_byte: u64,
-    bytes: usize,
+    bytes: u64,
 ) -> Result<(), ReadError> {
     check_size(width, height, max_pixels)?;
-    if width * height > per_byte * bytes as u64 {
+    if width * height > per_byte.saturating_mul(bytes) {
         return Err(format!(
             "claims {width} x {height} pixels in {bytes} bytes: truncated or damaged; get the file again"
         )

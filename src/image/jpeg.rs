@@ -29,27 +29,52 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
     if !is_whole(bytes) {
         return Err(damaged("the JPEG data ends too early"));
     }
-    let options =
-        DecoderOptions::default().set_strict_mode(true).set_max_width(usize::MAX).set_max_height(usize::MAX);
-    // The decoder of `tiff` reads from a vector too. With a slice here, there would be two copies of its code, and the page waits for both.
-    let mut owned = memory::filled(bytes.len(), 0)?;
-    owned.copy_from_slice(bytes);
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(owned), options);
-    decoder.decode_headers().map_err(reason)?;
-    let size = decoder.dimensions().ok_or_else(|| damaged("the JPEG file does not say its size"))?;
-    check_claim((size.0 as u64, size.1 as u64), max_pixels, MAX_PIXELS_PER_BYTE, bytes.len())?;
+    let (mut decoder, size) = opened(bytes, max_pixels, bytes.len() as u64)?;
     let (channels, colours) = match decoder.input_colorspace() {
         Some(ColorSpace::Luma) => (1, ColorSpace::Luma),
         _ => (3, ColorSpace::RGB),
     };
-    decoder.set_options(options.jpeg_set_out_colorspace(colours));
+    decoder.set_options(options().jpeg_set_out_colorspace(colours));
     let count = size.0 * size.1 * channels;
     let _claim = Claim::new((bytes.len() + count) as u64 + BYTES_BESIDE * (size.0 * size.1) as u64)?;
     let mut samples = memory::filled(count, 0)?;
     decoder.decode_into(&mut samples).map_err(reason)?;
-    let orientation = decoder.exif().map_or(Orientation::UPRIGHT, |data| Orientation::of_exif(data));
+    let orientation = orientation(&mut decoder);
     let doubt = scan::damage(bytes).map(|reason| format!("the JPEG data is damaged: {reason}"));
     Ok(Raster { orientation, doubt, ..Raster::of(size, channels, Samples::Byte(samples.into())) })
+}
+
+/// (width, height) and orientation of a file of `length` bytes, of which `bytes` are the first.
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) fn size(
+    bytes: &[u8],
+    max_pixels: u64,
+    length: u64,
+) -> Result<((usize, usize), Orientation), ReadError> {
+    let (mut decoder, size) = opened(bytes, max_pixels, length)?;
+    Ok((size, orientation(&mut decoder)))
+}
+
+type Decoder = JpegDecoder<ZCursor<Vec<u8>>>;
+
+/// The decoder of a file of `length` bytes, with its header read, and (width, height).
+fn opened(bytes: &[u8], max_pixels: u64, length: u64) -> Result<(Decoder, (usize, usize)), ReadError> {
+    // The decoder of `tiff` reads from a vector too. With a slice here, there would be two copies of its code, and the page waits for both.
+    let mut owned = memory::filled(bytes.len(), 0)?;
+    owned.copy_from_slice(bytes);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(owned), options());
+    decoder.decode_headers().map_err(reason)?;
+    let size = decoder.dimensions().ok_or_else(|| damaged("the JPEG file does not say its size"))?;
+    check_claim((size.0 as u64, size.1 as u64), max_pixels, MAX_PIXELS_PER_BYTE, length)?;
+    Ok((decoder, size))
+}
+
+fn options() -> DecoderOptions {
+    DecoderOptions::default().set_strict_mode(true).set_max_width(usize::MAX).set_max_height(usize::MAX)
+}
+
+fn orientation(decoder: &mut Decoder) -> Orientation {
+    decoder.exif().map_or(Orientation::UPRIGHT, |data| Orientation::of_exif(data))
 }
 
 /// The segments before the first scan: the kind and the place of each.

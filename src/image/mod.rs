@@ -4,6 +4,8 @@
 mod bands;
 #[cfg(feature = "files")]
 mod both;
+#[cfg(feature = "files")]
+mod bytes;
 #[cfg(feature = "cameras")]
 pub mod calib;
 #[cfg(feature = "cameras")]
@@ -11,6 +13,8 @@ pub mod cloud;
 pub(crate) mod cubic;
 #[cfg(feature = "files")]
 mod decode;
+#[cfg(all(feature = "files", not(target_arch = "wasm32")))]
+mod disk;
 mod downsampled;
 #[cfg(feature = "files")]
 mod file;
@@ -47,6 +51,8 @@ mod save_cloud;
 mod tiff;
 #[cfg(feature = "files")]
 mod upright;
+#[cfg(all(feature = "files", not(target_arch = "wasm32")))]
+pub mod windows;
 #[cfg(feature = "files")]
 pub mod write;
 

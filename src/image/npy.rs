@@ -56,6 +56,14 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
     Ok(Raster::of(size, channels, samples))
 }
 
+/// (width, height) by the header of an array.
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) fn size(bytes: &[u8], max_pixels: u64) -> Result<(usize, usize), ReadError> {
+    let (size, _) = Header::parse(bytes)?.image()?;
+    file::check_size(size.0 as u64, size.1 as u64, max_pixels)?;
+    Ok(size)
+}
+
 /// Decodes the only array of an archive.
 pub(super) fn decode_archive(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, ReadError> {
     decode(&only_array(bytes, max_pixels)?, max_pixels)

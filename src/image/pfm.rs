@@ -66,14 +66,8 @@ pub(super) fn is_pfm(bytes: &[u8]) -> bool {
 
 /// Parses a whole file of at most `max_pixels` pixels; the error describes the fault.
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Pfm, ReadError> {
-    if !is_pfm(bytes) {
-        return Err(NOT_PFM.into());
-    }
+    let ((width, height), mut at) = size(bytes, max_pixels)?;
     let colour = bytes[1] == b'F';
-    let mut at = 2;
-    let width = dimension(bytes, &mut at, "width")?;
-    let height = dimension(bytes, &mut at, "height")?;
-    file::check_size(width as u64, height as u64, max_pixels)?;
     let word = token(bytes, &mut at).ok_or("the PFM header ends before the scale")?;
     let scale = word.parse::<f64>().ok().filter(|s| s.is_finite() && *s != 0.0);
     let Some(scale) = scale else {
@@ -104,6 +98,18 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Pfm, ReadError> {
     } else {
         Pfm::Grey(Plane::from_fn(width, height, |x, y| value(x, y, 0)))
     })
+}
+
+/// (width, height) by the header, and the position after them.
+pub(super) fn size(bytes: &[u8], max_pixels: u64) -> Result<((usize, usize), usize), ReadError> {
+    if !is_pfm(bytes) {
+        return Err(NOT_PFM.into());
+    }
+    let mut at = 2;
+    let width = dimension(bytes, &mut at, "width")?;
+    let height = dimension(bytes, &mut at, "height")?;
+    file::check_size(width as u64, height as u64, max_pixels)?;
+    Ok(((width, height), at))
 }
 
 /// The next word of the header, after white space and comments. `at` moves to the byte after it.

@@ -161,7 +161,7 @@ impl<'a> Raster<'a> {
     }
 
     /// Also masks the pixels where `ignored`, which is as large as the image, is `true`.
-    fn ignoring(mut self, mut ignored: Vec<bool>) -> Self {
+    pub(super) fn ignoring(mut self, mut ignored: Vec<bool>) -> Self {
         add(&mut ignored, self.no_data.as_deref());
         self.no_data = Some(ignored);
         self
@@ -335,23 +335,10 @@ pub(super) fn joined(
     sizes: Sizes,
 ) -> Result<Pair> {
     let images = [&left, &right];
-    let ((width, height), (w, h)) = (left.size(), right.size());
-    if (width, height) != (w, h) && sizes == Sizes::Equal {
-        return Err(Error::Mismatch(format!(
-            "{of_left} is {width} x {height} and {of_right} is {w} x {h}: both images must have the same size"
-        )));
-    }
-    let float = images.map(|image| image.samples.is_float());
-    if float[0] != float[1] {
-        let [float, whole] = if float[0] { [&of_left, &of_right] } else { [&of_right, &of_left] };
-        return Err(Error::Mismatch(format!(
-            "{float} holds floats, but {whole} holds whole numbers: give both in the same format"
-        )));
-    }
-    // Pixels and masks of both views.
+    let own_sizes @ [(width, height), (w, h)] = images.map(Raster::size);
+    check_alike(own_sizes, images.map(|image| image.samples.is_float()), [&of_left, &of_right], sizes)?;
     let size = (width.max(w), height.max(h));
-    let pixels = size.0 as u64 * size.1 as u64;
-    memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, Purpose::Image)?;
+    check_memory(size)?;
     let masks = images.map(Raster::masked);
     let scale = Scale::of(images, &masks);
     let [in_left, in_right] = masks;
@@ -361,7 +348,6 @@ pub(super) fn joined(
     let l = scale.apply(&left, in_left);
     drop(left);
     let r = scale.apply(&right, in_right);
-    let own_sizes = [(width, height), (w, h)];
     Ok(Pair {
         georeferences,
         orientations,
@@ -371,9 +357,75 @@ pub(super) fn joined(
     })
 }
 
+/// Fails for images that make no pair, by their sizes and by whether they hold floats. Errors call them by these names.
+pub(super) fn check_alike(
+    [(width, height), (w, h)]: [(usize, usize); 2],
+    float: [bool; 2],
+    [of_left, of_right]: [impl Display; 2],
+    sizes: Sizes,
+) -> Result<()> {
+    if (width, height) != (w, h) && sizes == Sizes::Equal {
+        return Err(Error::Mismatch(format!(
+            "{of_left} is {width} x {height} and {of_right} is {w} x {h}: both images must have the same size"
+        )));
+    }
+    if float[0] != float[1] {
+        let [float, whole] = if float[0] { [&of_left, &of_right] } else { [&of_right, &of_left] };
+        return Err(Error::Mismatch(format!(
+            "{float} holds floats, but {whole} holds whole numbers: give both in the same format"
+        )));
+    }
+    Ok(())
+}
+
+/// Fails when there is no memory for the pixels and masks of both views of this size.
+pub(super) fn check_memory((width, height): (usize, usize)) -> Result<(), MemoryError> {
+    let pixels = width as u64 * height as u64;
+    memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, Purpose::Image)
+}
+
+/// What the scale depends on: the unmasked samples of both images, added in any number of parts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extremes {
+    /// Least and largest float.
+    min: f64,
+    max: f64,
+    /// All bits that are set in words.
+    bits: u16,
+    /// Whether all words are stretched 8-bit levels.
+    levels: bool,
+}
+
+impl Extremes {
+    /// Those of no sample.
+    pub(super) fn new() -> Self {
+        Self { min: f64::INFINITY, max: f64::NEG_INFINITY, bits: 0, levels: true }
+    }
+
+    /// Adds the samples of `image`, or of a part of it, where it is not `masked`.
+    pub(super) fn add(&mut self, image: &Raster, masked: &Plane<bool>) {
+        let Self { mut min, mut max, mut bits, mut levels } = *self;
+        match &image.samples {
+            Samples::Float(_) | Samples::Double(_) => {
+                of_any!(&image.samples, v => image.unmasked(v, masked).for_each(|&v| {
+                    min = min.min(v.double());
+                    max = max.max(v.double());
+                }));
+            }
+            Samples::Word(v) => image.unmasked(v, masked).for_each(|&v| {
+                bits |= v;
+                levels &= v.is_multiple_of(257);
+            }),
+            // Bytes always fill their range.
+            Samples::Byte(_) => {}
+        }
+        *self = Self { min, max, bits, levels };
+    }
+}
+
 /// The conversion from samples to levels, the same for both images of a pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Scale {
+pub(super) enum Scale {
     /// 8-bit levels, stored as they are or times 257.
     Level,
     /// Words with this many free bits at the top; 8-bit levels of the other view fill the same range.
@@ -385,31 +437,23 @@ enum Scale {
 impl Scale {
     /// The scale for the unmasked samples.
     fn of(images: [&Raster; 2], masks: &[Plane<bool>; 2]) -> Self {
-        let each = || images.into_iter().zip(masks);
-        if images[0].samples.is_float() {
-            let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
-            each().for_each(|(image, masked)| {
-                of_any!(&image.samples, v => image.unmasked(v, masked).for_each(|&v| {
-                    min = min.min(v.double());
-                    max = max.max(v.double());
-                }));
-            });
+        let mut extremes = Extremes::new();
+        images.into_iter().zip(masks).for_each(|(image, masked)| extremes.add(image, masked));
+        Self::from_extremes(extremes, images[0].samples.is_float())
+    }
+
+    /// The scale for samples with these extremes, which are floats or whole numbers.
+    pub(super) fn from_extremes(extremes: Extremes, float: bool) -> Self {
+        let Extremes { min, max, bits, levels } = extremes;
+        if float {
             return Self::Linear { min, max };
         }
         // Bytes always fill their range; words of 12 bits, say, must be shifted to match.
-        let (mut bits, mut levels) = (0, true);
-        each().for_each(|(image, masked)| {
-            if let Samples::Word(v) = &image.samples {
-                image.unmasked(v, masked).for_each(|&v| {
-                    bits |= v;
-                    levels &= v.is_multiple_of(257);
-                });
-            }
-        });
         if levels { Self::Level } else { Self::Shift(bits.leading_zeros().min(8)) }
     }
 
-    fn apply(self, raster: &Raster, masked: Plane<bool>) -> Image {
+    /// The levels of `raster`, or of a part of it.
+    pub(super) fn apply(self, raster: &Raster, masked: Plane<bool>) -> Image {
         let n = raster.channels;
         let pixels = match &raster.samples {
             Samples::Byte(v) => pixels(v, n, &masked, |v| self.byte(v)),

@@ -118,14 +118,8 @@ impl Reader {
     fn masked(self, image: Raster<'static>, mask: Option<&Path>, file: &Path) -> Result<Raster<'static>> {
         let Some(path) = mask else { return Ok(image) };
         let ignored = self.mask(path)?;
-        let ((w, h), (width, height)) = (ignored.size(), image.size());
-        image.masked_by(ignored).map_err(|_| {
-            Error::Mismatch(format!(
-                "the mask {} is {w} x {h} but {} is {width} x {height}: a mask must have the size of the left image",
-                path.display(),
-                file.display()
-            ))
-        })
+        check_mask((path, ignored.size()), (file, image.size()))?;
+        image.masked_by(ignored)
     }
 
     /// Reads one image, as stored or upright: a single view, or two side by side. [`Pair::of_frames`] makes a pair of two.
@@ -176,8 +170,7 @@ impl Reader {
     /// # Errors
     /// [`Error::Read`], like [`Reader::pair`].
     pub fn mask(self, path: &Path) -> Result<Plane<bool>> {
-        let raster = self.whole(path)?;
-        Ok(of_any!(&raster.samples, v => raster.plane(v, |c| c.iter().any(|&v| v.double() != 0.0))))
+        Ok(self.whole(path)?.not_black())
     }
 
     /// Reads 8-bit levels, such as those of Middlebury's visibility masks, from any integer image that
@@ -267,7 +260,27 @@ impl Reader {
     }
 }
 
+/// Fails when a mask and its image, each a file with its size, differ in size.
+pub(super) fn check_mask(
+    (mask, (w, h)): (&Path, (usize, usize)),
+    (file, (width, height)): (&Path, (usize, usize)),
+) -> Result<()> {
+    if (w, h) == (width, height) {
+        return Ok(());
+    }
+    Err(Error::Mismatch(format!(
+        "the mask {} is {w} x {h} but {} is {width} x {height}: a mask must have the size of the left image",
+        mask.display(),
+        file.display()
+    )))
+}
+
 impl Raster<'_> {
+    /// `true` where a pixel is not black; alpha does not count.
+    pub(super) fn not_black(&self) -> Plane<bool> {
+        of_any!(&self.samples, v => self.plane(v, |c| c.iter().any(|&v| v.double() != 0.0)))
+    }
+
     /// Prepends the name of its file to the doubt.
     pub(super) fn named(self, file: &Path) -> Self {
         Self { doubt: self.doubt.map(|doubt| format!("{}: {doubt}", file.display())), ..self }

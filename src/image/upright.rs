@@ -2,6 +2,7 @@
 
 use image::metadata;
 
+use super::Rect;
 use super::orientation::Orientation;
 use super::raster::{Raster, Sample, Samples, of_any};
 use crate::error::MemoryError;
@@ -33,6 +34,27 @@ impl Orientation {
             _ => (x, y),
         }
     }
+
+    /// The orientation of the stored image that the upright one has, taken as stored.
+    pub(super) fn inverse(self) -> Self {
+        match self.0 {
+            6 => Self(8),
+            8 => Self(6),
+            _ => self,
+        }
+    }
+
+    /// The size of the upright image, from that of the stored one, or the other way.
+    pub(super) fn turned(self, (width, height): (usize, usize)) -> (usize, usize) {
+        if self.is_sideways() { (height, width) } else { (width, height) }
+    }
+
+    /// The stored place of `part`, which is not empty, of an upright image of `size`.
+    pub(super) fn stored_part(self, part: &Rect, size: (usize, usize)) -> Rect {
+        let ends = [(part.x.start, part.y.start), (part.x.end - 1, part.y.end - 1)];
+        let [(a, b), (c, d)] = ends.map(|at| self.stored(at, size));
+        Rect { x: a.min(c)..a.max(c) + 1, y: b.min(d)..b.max(d) + 1 }
+    }
 }
 
 impl Raster<'_> {
@@ -56,7 +78,7 @@ impl Raster<'_> {
         if by.is_upright() {
             return Ok(self);
         }
-        let size = if by.is_sideways() { (self.height, self.width) } else { self.size() };
+        let size = by.turned(self.size());
         let samples = of_any!(&self.samples, v => Sample::samples(turned(v, n, by, size)?.into()));
         let no_data = self.no_data.as_ref().map(|marked| turned(marked, 1, by, size)).transpose()?;
         Ok(Self { no_data, doubt: self.doubt, ..Self::of(size, n, samples) })

@@ -23,14 +23,14 @@ pub(super) const FAX4: u64 = 4;
 pub(super) const JPEG: u64 = 7;
 
 /// How the rows of a strip or tile are stored.
-pub(super) struct Packing<'a> {
+pub(super) struct Packing {
     /// The value of the tag.
     pub(super) compression: u64,
     pub(super) predictor: u64,
     /// Whether the first bit of a byte is the lowest.
     pub(super) reversed: bool,
     /// Tables shared by all strips or tiles.
-    pub(super) jpeg_tables: Option<&'a [u8]>,
+    pub(super) jpeg_tables: Option<Vec<u8>>,
     pub(super) order: ByteOrder,
     pub(super) bits: u32,
     /// Samples of a pixel in a row: one where each channel has its own plane.
@@ -41,31 +41,19 @@ pub(super) struct Packing<'a> {
     pub(super) row_bytes: usize,
 }
 
-impl Packing<'_> {
-    /// The first `rows` rows of a strip or tile.
+impl Packing {
+    /// The first `rows` rows of a strip or tile, of which `data` holds all bytes, or those of these rows if they are not packed.
     ///
     /// # Errors
     /// A description of the damage, in one line.
-    pub(super) fn rows<'a>(&self, data: &'a [u8], rows: usize) -> Result<Cow<'a, [u8]>, ReadError> {
-        let bytes = self.row_bytes * rows;
-        let data = if self.reversed && self.compression != JPEG {
+    pub(super) fn rows<'a>(&self, mut data: Cow<'a, [u8]>, rows: usize) -> Result<Cow<'a, [u8]>, ReadError> {
+        if self.reversed && self.compression != JPEG {
             let mut copy = memory::filled(data.len(), 0_u8)?;
-            copy.iter_mut().zip(data).for_each(|(to, from)| *to = from.reverse_bits());
-            Cow::Owned(copy)
-        } else {
-            Cow::Borrowed(data)
-        };
-        let mut rows = if self.compression == UNCOMPRESSED {
-            if data.len() < bytes {
-                return Err(damaged("the TIFF file ends within its pixels"));
-            }
-            match data {
-                Cow::Borrowed(data) => Cow::Borrowed(&data[..bytes]),
-                Cow::Owned(data) => Cow::Owned(data),
-            }
-        } else {
-            Cow::Owned(self.unpacked(&data, rows)?)
-        };
+            copy.iter_mut().zip(&*data).for_each(|(to, from)| *to = from.reverse_bits());
+            data = Cow::Owned(copy);
+        }
+        let mut rows =
+            if self.compression == UNCOMPRESSED { data } else { Cow::Owned(self.unpacked(&data, rows)?) };
         if self.predictor != 1 {
             rows.to_mut().chunks_exact_mut(self.row_bytes).for_each(|row| self.undo_predictor(row));
         }
@@ -89,7 +77,7 @@ impl Packing<'_> {
             |n: usize| u32::try_from(n).map_err(|_| unsupported("a TIFF strip or tile is too large"));
         let (width, height, length) = (number(width)?, number(rows)?, number(data.len())?);
         // Reserve room for the directory.
-        let room = data.len() + self.jpeg_tables.map_or(0, <[u8]>::len) + 1024;
+        let room = data.len() + self.jpeg_tables.as_ref().map_or(0, Vec::len) + 1024;
         let mut file = Cursor::new(memory::reserved(room)?);
         let mut write = || -> TiffResult<()> {
             let mut encoder = TiffEncoder::new(&mut file)?;
@@ -103,7 +91,7 @@ impl Packing<'_> {
             strip.write_tag(Tag::StripOffsets, place)?;
             strip.write_tag(Tag::RowsPerStrip, height)?;
             strip.write_tag(Tag::StripByteCounts, length)?;
-            if let Some(tables) = self.jpeg_tables.filter(|tables| !tables.is_empty()) {
+            if let Some(tables) = self.jpeg_tables.as_deref().filter(|tables| !tables.is_empty()) {
                 strip.write_tag(Tag::JPEGTables, tables)?;
             }
             strip.finish()
@@ -178,7 +166,7 @@ mod tests {
     use super::*;
 
     /// The packing of a row of four samples of 16 bits or more.
-    fn packing(bits: u32, samples: usize, predictor: u64, order: ByteOrder) -> Packing<'static> {
+    fn packing(bits: u32, samples: usize, predictor: u64, order: ByteOrder) -> Packing {
         let (width, row_bytes) = (4, 4 * samples * bits as usize / 8);
         Packing {
             compression: UNCOMPRESSED,
@@ -202,9 +190,9 @@ mod tests {
             (ByteOrder::BigEndian, u16::to_be_bytes as fn(u16) -> [u8; 2]),
         ] {
             let stored = differences.map(bytes).concat();
-            let rows = packing(16, 1, 2, order).rows(&stored, 1).unwrap();
+            let rows = packing(16, 1, 2, order).rows(Cow::Borrowed(&stored), 1).unwrap();
             assert_eq!(*rows, values.map(bytes).concat(), "{order:?}");
-            let plain = packing(16, 1, 1, order).rows(&stored, 1).unwrap();
+            let plain = packing(16, 1, 1, order).rows(Cow::Borrowed(&stored), 1).unwrap();
             assert_eq!(*plain, stored, "control");
         }
     }
@@ -217,7 +205,7 @@ mod tests {
         for i in (1..stored.len()).rev() {
             stored[i] = stored[i].wrapping_sub(planes[i - 1]);
         }
-        let rows = packing(32, 1, 3, ByteOrder::LittleEndian).rows(&stored, 1).unwrap();
+        let rows = packing(32, 1, 3, ByteOrder::LittleEndian).rows(Cow::Borrowed(&stored), 1).unwrap();
         assert_eq!(*rows, values.map(f32::to_le_bytes).concat());
     }
 

@@ -1,10 +1,12 @@
 //! Directories of TIFF files: tags and their values, as stored.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 
 use tiff::tags::{ByteOrder, Tag};
 
 use crate::error::ReadError;
+use crate::image::bytes::Bytes;
 use crate::image::file::{damaged, unsupported};
 
 /// Most directories that are read, so that an endless file ends.
@@ -22,7 +24,7 @@ struct Entry {
 
 /// The tags of one image in a file.
 pub(super) struct Directory<'a> {
-    file: &'a [u8],
+    file: Bytes<'a>,
     pub(super) order: ByteOrder,
     entries: Vec<Entry>,
     /// Position of the next directory; 0 after the last.
@@ -34,13 +36,14 @@ impl<'a> Directory<'a> {
     ///
     /// # Errors
     /// A description of the damage, in one line.
-    pub(super) fn parse(file: &'a [u8]) -> Result<Self, ReadError> {
-        let (order, big) = match file {
+    pub(super) fn parse(file: Bytes<'a>) -> Result<Self, ReadError> {
+        let first = file.get(0, 4)?;
+        let (order, big) = match first.as_deref().unwrap_or_default() {
             [b'I', b'I', kind, 0, ..] => (ByteOrder::LittleEndian, *kind == 43),
             [b'M', b'M', 0, kind, ..] => (ByteOrder::BigEndian, *kind == 43),
             _ => return Err(damaged("the TIFF file does not begin like one")),
         };
-        let mut place = number_at(file, order, if big { 8 } else { 4 }, if big { 8 } else { 4 })
+        let mut place = number_at(file, order, if big { 8 } else { 4 }, if big { 8 } else { 4 })?
             .ok_or_else(|| damaged("the TIFF file ends before its directory"))?;
         let first = Self::read(file, order, big, place)?;
         if first.is_image()? {
@@ -63,27 +66,26 @@ impl<'a> Directory<'a> {
         Ok(first)
     }
 
-    fn read(file: &'a [u8], order: ByteOrder, big: bool, place: u64) -> Result<Self, ReadError> {
+    fn read(file: Bytes<'a>, order: ByteOrder, big: bool, place: u64) -> Result<Self, ReadError> {
         // Sizes of the number of entries, of an entry, and of counts and positions.
-        let (head, size, wide) = if big { (8, 20, 8) } else { (2, 12, 4) };
+        let (head, size, wide) = if big { (8, 20_u64, 8) } else { (2, 12, 4) };
         let ends = || damaged("the TIFF file ends within its directory");
-        let count = number_at(file, order, place, head as usize).ok_or_else(ends)?;
-        if count > (file.len() / size) as u64 {
+        let count = number_at(file, order, place, head as usize)?.ok_or_else(ends)?;
+        if count > file.len() / size {
             return Err(damaged(format!("the TIFF directory claims {count} tags in {} bytes", file.len())));
         }
+        let start = place + head;
+        let table = file.get(start, count * size)?.ok_or_else(ends)?;
         let mut entries = Vec::new();
-        for i in 0..count {
-            let at = place + head + i * size as u64;
-            let field =
-                |offset: u64, length: usize| number_at(file, order, at + offset, length).ok_or_else(ends);
-            let (tag, kind, count) = (field(0, 2)? as u16, field(2, 2)? as u16, field(4, wide)?);
-            let inline = at + 4 + wide as u64;
+        for (at, entry) in (start..).step_by(size as usize).zip(table.chunks_exact(size as usize)) {
+            let field = |offset: usize, length: usize| number(order, &entry[offset..offset + length]);
+            let (tag, kind, count) = (field(0, 2) as u16, field(2, 2) as u16, field(4, wide));
             let fits =
                 (size_of_kind(kind) as u64).checked_mul(count).is_some_and(|bytes| bytes <= wide as u64);
-            let place = if fits { inline } else { number_at(file, order, inline, wide).ok_or_else(ends)? };
+            let place = if fits { at + 4 + wide as u64 } else { field(4 + wide, wide) };
             entries.push(Entry { tag, kind, count, place });
         }
-        let next = number_at(file, order, place + head + count * size as u64, wide).ok_or_else(ends)?;
+        let next = number_at(file, order, start + count * size, wide)?.ok_or_else(ends)?;
         Ok(Self { file, order, entries, next })
     }
 
@@ -99,15 +101,12 @@ impl<'a> Directory<'a> {
     }
 
     /// The values of a tag as stored, with their type.
-    pub(super) fn values(&self, tag: Tag) -> Result<Option<(u16, &'a [u8])>, ReadError> {
+    pub(super) fn values(&self, tag: Tag) -> Result<Option<(u16, Cow<'a, [u8]>)>, ReadError> {
         let Some(entry) = self.entries.iter().find(|entry| entry.tag == tag.to_u16()) else {
             return Ok(None);
         };
         let bytes = entry.count.checked_mul(size_of_kind(entry.kind) as u64);
-        let range = bytes.and_then(|bytes| Some(entry.place..entry.place.checked_add(bytes)?));
-        let values = range.and_then(|range| {
-            self.file.get(usize::try_from(range.start).ok()?..usize::try_from(range.end).ok()?)
-        });
+        let values = bytes.map(|bytes| self.file.get(entry.place, bytes)).transpose()?.flatten();
         match values {
             Some(values) => Ok(Some((entry.kind, values))),
             None => Err(damaged(format!(
@@ -149,7 +148,7 @@ impl<'a> Directory<'a> {
     }
 
     /// The bytes of a tag of any type.
-    pub(super) fn bytes(&self, tag: Tag) -> Result<Option<&'a [u8]>, ReadError> {
+    pub(super) fn bytes(&self, tag: Tag) -> Result<Option<Cow<'a, [u8]>>, ReadError> {
         Ok(self.values(tag)?.map(|(_, values)| values))
     }
 
@@ -167,7 +166,8 @@ impl<'a> Directory<'a> {
 
     /// The text of a tag, up to its end.
     pub(super) fn text(&self, tag: Tag) -> Result<Option<String>, ReadError> {
-        let text = self.bytes(tag)?.and_then(|bytes| bytes.split(|byte| *byte == 0).next());
+        let bytes = self.bytes(tag)?;
+        let text = bytes.as_deref().and_then(|bytes| bytes.split(|byte| *byte == 0).next());
         Ok(text.map(|bytes| String::from_utf8_lossy(bytes).trim().to_owned()))
     }
 }
@@ -182,9 +182,8 @@ pub(super) fn number(order: ByteOrder, bytes: &[u8]) -> u64 {
 }
 
 /// The number of `size` bytes at `place`; `None` beyond the end.
-fn number_at(file: &[u8], order: ByteOrder, place: u64, size: usize) -> Option<u64> {
-    let start = usize::try_from(place).ok()?;
-    Some(number(order, file.get(start..start.checked_add(size)?)?))
+fn number_at(file: Bytes, order: ByteOrder, place: u64, size: usize) -> Result<Option<u64>, ReadError> {
+    Ok(file.get(place, size as u64)?.map(|bytes| number(order, &bytes)))
 }
 
 /// Bytes per value of a field type.

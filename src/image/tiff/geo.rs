@@ -31,7 +31,7 @@ fn field(directory: &Directory, tag: Tag, kind: Type) -> Option<Field> {
     if stored != kind.to_u16() || values.is_empty() || values.len() > MAX_BYTES {
         return None;
     }
-    let mut bytes = values.to_vec();
+    let mut bytes = values.into_owned();
     directory.order.convert(kind, &mut bytes, ByteOrder::native());
     Some(Field { tag, kind, bytes })
 }

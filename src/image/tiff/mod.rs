@@ -13,6 +13,7 @@ mod geo;
 pub(super) use encode::{MAX_PLAIN, encode, write_bands};
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use half::f16;
 use tiff::tags::{ByteOrder, Tag};
@@ -20,7 +21,10 @@ use tiff::tags::{ByteOrder, Tag};
 use self::chunks::Packing;
 use self::colours::Colours;
 use self::directory::Directory;
+use super::Rect;
+use super::bytes::Bytes;
 use super::file::{MAX_PIXELS_PER_BYTE, check_claim, damaged, unsupported};
+use super::georeference::Georeference;
 use super::orientation::Orientation;
 use super::raster::{Raster, Sample, Samples, holding};
 use crate::error::ReadError;
@@ -36,7 +40,7 @@ enum Format {
 }
 
 /// The location of an image's pixels, and their format.
-struct Layout<'a> {
+struct Layout {
     width: usize,
     height: usize,
     format: Format,
@@ -51,7 +55,7 @@ struct Layout<'a> {
     byte_counts: Option<Vec<u64>>,
     /// Columns and rows that share a pair of chroma samples, if chroma is subsampled.
     subsampling: Option<(usize, usize)>,
-    packing: Packing<'a>,
+    packing: Packing,
 }
 
 /// Decodes a file of at most `max_pixels` pixels. Pixels whose samples are all `no_data`, or else the no-data
@@ -64,22 +68,97 @@ pub(super) fn decode(
     max_pixels: u64,
     no_data: Option<f64>,
 ) -> Result<Raster<'static>, ReadError> {
-    let directory = Directory::parse(file)?;
-    let colours = Colours::from_directory(&directory)?;
-    let layout = Layout::from_directory(&directory, &colours, file.len(), max_pixels)?;
-    let no_data = no_data.map_or_else(|| no_data_of(&directory), |value| Ok(Some(value)))?;
-    let samples = layout.samples(file, no_data.unwrap_or(0.0))?;
-    let no_data = no_data.map(|value| holding(&samples, layout.read, colours.stored(), value)).transpose()?;
-    let (channels, samples) = colours.levels(samples)?;
-    let georeference = geo::georeference(&directory);
-    // Ignore a damaged orientation tag, which does not affect the pixels.
-    let orientation = Orientation::of_tag(directory.first(Tag::Orientation, 1).unwrap_or(1));
-    Ok(Raster {
-        no_data,
-        georeference,
-        orientation,
-        ..Raster::of((layout.width, layout.height), channels, samples)
-    })
+    let file = Bytes::Held(file);
+    let image = Stored::find(file, max_pixels, no_data)?;
+    let whole = image.part(file, &Rect::whole(image.size()))?;
+    Ok(Raster { georeference: image.georeference, orientation: image.orientation, ..whole })
+}
+
+/// The image of a file, of which parts can be read.
+pub(super) struct Stored {
+    layout: Layout,
+    colours: Colours,
+    no_data: Option<f64>,
+    pub(super) georeference: Option<Georeference>,
+    pub(super) orientation: Orientation,
+}
+
+impl Stored {
+    /// Finds the image in `file`, by the rules of [`decode`], without reading its pixels.
+    ///
+    /// # Errors
+    /// A description of the damage, in one line.
+    pub(super) fn find(file: Bytes, max_pixels: u64, no_data: Option<f64>) -> Result<Self, ReadError> {
+        let directory = Directory::parse(file)?;
+        let colours = Colours::from_directory(&directory)?;
+        let layout = Layout::from_directory(&directory, &colours, file.len(), max_pixels)?;
+        let no_data = no_data.map_or_else(|| no_data_of(&directory), |value| Ok(Some(value)))?;
+        let georeference = geo::georeference(&directory);
+        // Ignore a damaged orientation tag, which does not affect the pixels.
+        let orientation = Orientation::of_tag(directory.first(Tag::Orientation, 1).unwrap_or(1));
+        Ok(Self { layout, colours, no_data, georeference, orientation })
+    }
+
+    /// (width, height) in pixels.
+    pub(super) fn size(&self) -> (usize, usize) {
+        (self.layout.width, self.layout.height)
+    }
+
+    /// The pixels in `part`, without georeference and orientation.
+    ///
+    /// # Errors
+    /// A description of the damage, in one line.
+    pub(super) fn part(&self, file: Bytes, part: &Rect) -> Result<Raster<'static>, ReadError> {
+        let samples = self.layout.samples(file, part, self.no_data.unwrap_or(0.0))?;
+        let holding = |value| holding(&samples, self.layout.read, self.colours.stored(), value);
+        let no_data = self.no_data.map(holding).transpose()?;
+        let (channels, samples) = self.colours.levels(samples)?;
+        Ok(Raster { no_data, ..Raster::of(part.size(), channels, samples) })
+    }
+}
+
+/// What reading by parts needs beside.
+#[cfg(not(target_arch = "wasm32"))]
+impl Stored {
+    /// Fails where the file is too short for its pixels.
+    ///
+    /// # Errors
+    /// A description of the damage, in one line.
+    pub(super) fn check_places(&self, file: Bytes) -> Result<(), ReadError> {
+        let (across, down) = self.layout.counts();
+        let count = across * down * self.layout.planes_read();
+        (0..count).try_for_each(|i| self.layout.place(i, file.len()).map(|_| ()))
+    }
+
+    /// Bytes that are unpacked for a single pixel: those of a strip or tile, or none where rows are not packed.
+    /// `None` where the file does not say where each strip or tile ends.
+    pub(super) fn unpacked_bytes(&self) -> Option<u64> {
+        let layout = &self.layout;
+        if !layout.is_packed() {
+            return Some(0);
+        }
+        layout.byte_counts.as_ref().map(|_| layout.packing.row_bytes as u64 * layout.stored_rows(0) as u64)
+    }
+
+    /// Parts that cover the image, each of about `pixels` pixels, and that together unpack each strip or tile once.
+    pub(super) fn pieces(&self, pixels: usize) -> Vec<Rect> {
+        let (width, height) = self.size();
+        let chunk = self.layout.chunk;
+        let (across, down) = (chunk.0.min(width), chunk.1.min(height));
+        // Rows that are not packed can be read alone; those that share chroma belong together.
+        let down =
+            if self.layout.is_packed() { down } else { self.layout.subsampling.map_or(1, |(_, down)| down) };
+        let rows = down * (pixels / (width * down)).max(1);
+        let columns = if width * rows <= pixels { width } else { across * (pixels / (rows * across)).max(1) };
+        let ends = |start: usize, step: usize, end: usize| start..(start + step).min(end);
+        let tops = (0..height).step_by(rows);
+        tops.flat_map(|y| {
+            (0..width)
+                .step_by(columns)
+                .map(move |x| Rect { x: ends(x, columns, width), y: ends(y, rows, height) })
+        })
+        .collect()
+    }
 }
 
 /// The no-data value that GDAL's tag declares.
@@ -93,11 +172,11 @@ fn no_data_of(directory: &Directory) -> Result<Option<f64>, ReadError> {
     }
 }
 
-impl<'a> Layout<'a> {
+impl Layout {
     fn from_directory(
-        directory: &Directory<'a>,
+        directory: &Directory,
         colours: &Colours,
-        file_bytes: usize,
+        file_bytes: u64,
         max_pixels: u64,
     ) -> Result<Self, ReadError> {
         let size =
@@ -221,7 +300,7 @@ impl<'a> Layout<'a> {
             compression,
             predictor,
             reversed,
-            jpeg_tables: directory.bytes(Tag::JPEGTables)?,
+            jpeg_tables: directory.bytes(Tag::JPEGTables)?.map(Cow::into_owned),
             order: directory.order,
             bits,
             samples,
@@ -232,91 +311,165 @@ impl<'a> Layout<'a> {
         Ok(Self { width, height, format, read, planar, chunk, offsets, byte_counts, subsampling, packing })
     }
 
-    /// All samples that are read; `missing` fills strips or tiles that the file omits.
-    fn samples(&self, file: &[u8], missing: f64) -> Result<Samples<'static>, ReadError> {
+    /// The samples of `part` that are read; `missing` fills strips or tiles that the file omits.
+    fn samples(&self, file: Bytes, part: &Rect, missing: f64) -> Result<Samples<'static>, ReadError> {
         let (order, bits) = (self.packing.order, self.packing.bits);
         let size = bits as usize / 8;
         let number = |row: &[u8], i: usize| directory::number(order, &row[i * size..(i + 1) * size]);
         let signed = |row: &[u8], i: usize| (number(row, i) << (64 - bits)) as i64 >> (64 - bits);
         let float = missing as f32;
         match (self.format, bits) {
-            (Format::Unsigned, 8) => self.assembled(file, missing as u8, |row, i| row[i]),
+            (Format::Unsigned, 8) => self.assembled(file, part, missing as u8, |row, i| row[i]),
             (Format::Unsigned, 16) => {
                 let word = match order {
                     ByteOrder::LittleEndian => u16::from_le_bytes,
                     ByteOrder::BigEndian => u16::from_be_bytes,
                 };
-                self.assembled(file, missing as u16, |row, i| word([row[2 * i], row[2 * i + 1]]))
+                self.assembled(file, part, missing as u16, |row, i| word([row[2 * i], row[2 * i + 1]]))
             }
             (Format::Unsigned, 1..8) => {
-                self.assembled(file, missing as u8, |row, i| packed(row, i, bits) as u8)
+                self.assembled(file, part, missing as u8, |row, i| packed(row, i, bits) as u8)
             }
             (Format::Unsigned, 9..16) => {
-                self.assembled(file, missing as u16, |row, i| packed(row, i, bits) as u16)
+                self.assembled(file, part, missing as u16, |row, i| packed(row, i, bits) as u16)
             }
-            (Format::Unsigned, 24 | 32 | 64) => self.assembled(file, missing, |row, i| number(row, i) as f64),
-            (Format::Unsigned, _) => self.assembled(file, missing, |row, i| packed(row, i, bits) as f64),
-            (Format::Signed, 8 | 16) => self.assembled(file, float, |row, i| signed(row, i) as f32),
-            (Format::Signed, _) => self.assembled(file, missing, |row, i| signed(row, i) as f64),
+            (Format::Unsigned, 24 | 32 | 64) => {
+                self.assembled(file, part, missing, |row, i| number(row, i) as f64)
+            }
+            (Format::Unsigned, _) => {
+                self.assembled(file, part, missing, |row, i| packed(row, i, bits) as f64)
+            }
+            (Format::Signed, 8 | 16) => self.assembled(file, part, float, |row, i| signed(row, i) as f32),
+            (Format::Signed, _) => self.assembled(file, part, missing, |row, i| signed(row, i) as f64),
             (Format::Float, 16) => {
-                self.assembled(file, float, |row, i| f16::from_bits(number(row, i) as u16).to_f32())
+                self.assembled(file, part, float, |row, i| f16::from_bits(number(row, i) as u16).to_f32())
             }
             (Format::Float, 32) => {
-                self.assembled(file, float, |row, i| f32::from_bits(number(row, i) as u32))
+                self.assembled(file, part, float, |row, i| f32::from_bits(number(row, i) as u32))
             }
-            (Format::Float, _) => self.assembled(file, missing, |row, i| f64::from_bits(number(row, i))),
+            (Format::Float, _) => {
+                self.assembled(file, part, missing, |row, i| f64::from_bits(number(row, i)))
+            }
         }
     }
 
-    /// Assembles strips or tiles; `read` extracts sample `i` of a row.
+    /// Assembles `part` from strips or tiles; `read` extracts sample `i` of a row.
     fn assembled<S: Sample>(
         &self,
-        file: &[u8],
+        file: Bytes,
+        part: &Rect,
         missing: S,
         read: impl Fn(&[u8], usize) -> S,
     ) -> Result<Samples<'static>, ReadError> {
-        let mut out = memory::filled(self.width * self.height * self.read, missing)?;
-        let (across, down) = (self.width.div_ceil(self.chunk.0), self.height.div_ceil(self.chunk.1));
+        let mut out = memory::filled(part.x.len() * part.y.len() * self.read, missing)?;
+        let (across, down) = self.counts();
         let (in_row, samples) = if self.planar { (1, 1) } else { (self.read, self.packing.samples) };
-        for (i, &offset) in self.offsets.iter().enumerate() {
-            let (plane, place) = (i / (across * down), i % (across * down));
-            if plane >= if self.planar { self.read } else { 1 } {
-                break;
-            }
-            let bytes = self.byte_counts.as_ref().map(|counts| counts[i]);
-            if bytes == Some(0) {
-                // GDAL omits tiles without data.
-                continue;
-            }
-            let (left, top) = (place % across * self.chunk.0, place / across * self.chunk.1);
-            let columns = self.chunk.0.min(self.width - left);
-            let rows = self.chunk.1.min(self.height - top);
-            let data = usize::try_from(offset).ok().and_then(|start| file.get(start..));
-            let data = data.ok_or_else(|| damaged("the TIFF pixels begin behind the end of the file"))?;
-            let end = bytes.map_or(data.len(), |bytes| usize::try_from(bytes).unwrap_or(usize::MAX));
-            if end > data.len() {
-                return Err(damaged("the TIFF pixels end behind the end of the file"));
-            }
-            // Without compression the size is known, even if the file's byte counts are wrong.
-            let data = if self.packing.compression == chunks::UNCOMPRESSED { data } else { &data[..end] };
-            let stored =
-                self.packing.rows(data, rows.div_ceil(self.subsampling.map_or(1, |(_, down)| down)))?;
-            let stored = match self.subsampling {
-                Some(sub) => Cow::Owned(colours::spread(&stored, self.chunk.0, rows, sub)?),
-                None => stored,
-            };
-            let row_bytes =
-                if self.subsampling.is_some() { 3 * self.chunk.0 } else { self.packing.row_bytes };
-            for (y, row) in (top..top + rows).zip(stored.chunks_exact(row_bytes)) {
-                let start = (y * self.width + left) * self.read + plane;
-                for x in 0..columns {
-                    for c in 0..in_row {
-                        out[start + x * self.read + c] = read(row, x * samples + c);
+        let covered = |range: &Range<usize>, side: usize| range.start / side..range.end.div_ceil(side);
+        for plane in 0..self.planes_read() {
+            for (v, u) in covered(&part.y, self.chunk.1)
+                .flat_map(|v| covered(&part.x, self.chunk.0).map(move |u| (v, u)))
+            {
+                let Some(place) = self.place((plane * down + v) * across + u, file.len())? else { continue };
+                let (left, top) = (u * self.chunk.0, v * self.chunk.1);
+                let columns = left.max(part.x.start)..(left + self.chunk.0).min(part.x.end);
+                let rows = top.max(part.y.start)..(top + self.chunk.1).min(part.y.end);
+                let (first, stored) = self.rows(file, place, v, &rows)?;
+                let row_bytes =
+                    if self.subsampling.is_some() { 3 * self.chunk.0 } else { self.packing.row_bytes };
+                let lines = (first..rows.end).zip(stored.chunks_exact(row_bytes));
+                for (y, row) in lines.skip(rows.start - first) {
+                    let pixel = (y - part.y.start) * part.x.len() + columns.start - part.x.start;
+                    let (start, from) = (pixel * self.read + plane, columns.start - left);
+                    for x in 0..columns.len() {
+                        for c in 0..in_row {
+                            out[start + x * self.read + c] = read(row, (from + x) * samples + c);
+                        }
                     }
                 }
             }
         }
         Ok(S::samples(out.into()))
+    }
+
+    /// The stored rows of a strip or tile of row `v` of them that cover the image's `rows`, with spread chroma, and the image row of the first one.
+    fn rows<'a>(
+        &self,
+        file: Bytes<'a>,
+        place: Range<u64>,
+        v: usize,
+        rows: &Range<usize>,
+    ) -> Result<(usize, Cow<'a, [u8]>), ReadError> {
+        let top = v * self.chunk.1;
+        let down = self.subsampling.map_or(1, |(_, down)| down);
+        // Rows that are not packed are read alone.
+        let (first, count) = if self.is_packed() {
+            (0, self.stored_rows(v))
+        } else {
+            let first = (rows.start - top) / down;
+            (first, (rows.end - top).div_ceil(down) - first)
+        };
+        let row_bytes = self.packing.row_bytes as u64;
+        let (start, length) = if self.is_packed() {
+            (place.start, place.end - place.start)
+        } else {
+            (place.start + first as u64 * row_bytes, count as u64 * row_bytes)
+        };
+        let data = file.get(start, length)?;
+        let data = data.ok_or_else(|| damaged("the TIFF pixels end behind the end of the file"))?;
+        let stored = self.packing.rows(data, count)?;
+        let top = top + first * down;
+        Ok((
+            top,
+            match self.subsampling {
+                Some(sub) => Cow::Owned(colours::spread(&stored, self.chunk.0, rows.end - top, sub)?),
+                None => stored,
+            },
+        ))
+    }
+
+    /// Whether rows are compressed.
+    fn is_packed(&self) -> bool {
+        self.packing.compression != chunks::UNCOMPRESSED
+    }
+
+    /// Number of strips or tiles across and down.
+    fn counts(&self) -> (usize, usize) {
+        (self.width.div_ceil(self.chunk.0), self.height.div_ceil(self.chunk.1))
+    }
+
+    /// Number of planes that are read.
+    fn planes_read(&self) -> usize {
+        if self.planar { self.read } else { 1 }
+    }
+
+    /// Rows that are stored inside the image for strips or tiles of row `v` of them.
+    fn stored_rows(&self, v: usize) -> usize {
+        let rows = self.chunk.1.min(self.height - v * self.chunk.1);
+        rows.div_ceil(self.subsampling.map_or(1, |(_, down)| down))
+    }
+
+    /// The place of strip or tile `i` in a file of `length` bytes; `None` where GDAL has omitted one without data.
+    fn place(&self, i: usize, length: u64) -> Result<Option<Range<u64>>, ReadError> {
+        let bytes = self.byte_counts.as_ref().map(|counts| counts[i]);
+        if bytes == Some(0) {
+            return Ok(None);
+        }
+        let start = self.offsets[i];
+        let left = length.checked_sub(start);
+        let left = left.ok_or_else(|| damaged("the TIFF pixels begin behind the end of the file"))?;
+        let mut bytes = bytes.unwrap_or(left);
+        if bytes > left {
+            return Err(damaged("the TIFF pixels end behind the end of the file"));
+        }
+        if !self.is_packed() {
+            // The size is known, even if the file's byte counts are wrong.
+            let (across, down) = self.counts();
+            bytes = self.packing.row_bytes as u64 * self.stored_rows(i / across % down) as u64;
+            if bytes > left {
+                return Err(damaged("the TIFF file ends within its pixels"));
+            }
+        }
+        Ok(Some(start..start + bytes))
     }
 }
 
