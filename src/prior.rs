@@ -15,13 +15,13 @@ use crate::error::{Error, Result};
 use crate::image::{Plane, Rect};
 use crate::maps::{FRACTION, Maps, flag};
 use crate::options::MAX_DISPARITY;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Smallest and largest standard deviation, in px; others are set to these.
 const SIGMAS: [f64; 2] = [1.0 / 16.0, 255.0];
 
 /// How a prior is used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PriorKind {
     /// Sparse, exact points.
@@ -93,7 +93,7 @@ impl PriorPoint {
 }
 
 /// How much of a prior a match has used.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PriorUse {
     /// How it was used.
     pub kind: PriorKind,

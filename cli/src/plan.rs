@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 use mrfgs::low_level::plan::{FullSize, Plan};
 use mrfgs::low_level::program::tiles::Tiles;
-use mrfgs::options::Order;
+use mrfgs::options::{DisparityRange, Method, Order};
+use mrfgs::region::Blocks;
 
 use crate::failure::Result;
 use crate::table::Table;
@@ -15,6 +16,20 @@ pub(crate) fn describe(plan: &Plan) -> Result<String> {
     let own = at_one_size(&Tiles::new(plan)?);
     let Some(double) = plan.doubled()? else { return Ok(own) };
     Ok(format!("{own}\nThen at twice the size:\n\n{}", at_one_size(&Tiles::new(&double)?)))
+}
+
+/// Describes the blocks of a pair, and the plan of the largest one.
+pub(crate) fn describe_blocks(blocks: &Blocks, range: DisparityRange, method: &Method) -> Result<String> {
+    let (width, height) = blocks.size();
+    let windows = blocks.list().iter().map(|block| block.window().size());
+    let (w, h) = windows.max_by_key(|(width, height)| width * height).unwrap_or((width, height));
+    let count = blocks.list().len();
+    let plan = Plan::new(w, h, range, method)?;
+    Ok(format!(
+        "{width} x {height} pixels in {count} block{}, the largest of which:\n{}",
+        plural(count),
+        describe(&plan)?
+    ))
 }
 
 fn at_one_size(tiles: &Tiles) -> String {

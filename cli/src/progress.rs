@@ -51,29 +51,40 @@ impl Bar {
 pub(crate) struct Counter {
     bar: ProgressBar,
     log: Log,
+    /// What is counted, in the plural.
+    what: &'static str,
 }
 
 impl Counter {
     /// A counter of `pairs`, of which `done` are already finished.
     pub(crate) fn of_pairs(pairs: usize, done: usize, quiet: bool) -> Self {
-        let bar = bar(Some(pairs), "mrfgs [{bar:40}] {pos} of {len} {msg}", quiet);
+        Self::of("pairs", pairs, done, quiet)
+    }
+
+    /// A counter of `blocks`, of which `done` are already complete.
+    pub(crate) fn of_blocks(blocks: usize, done: usize, quiet: bool) -> Self {
+        Self::of("blocks", blocks, done, quiet)
+    }
+
+    fn of(what: &'static str, all: usize, done: usize, quiet: bool) -> Self {
+        let bar = bar(Some(all), "mrfgs [{bar:40}] {pos} of {len} {msg}", quiet);
         bar.set_position(done as u64);
-        Self { bar, log: Log::new(quiet) }
+        Self { bar, log: Log::new(quiet), what }
     }
 
     /// A counter of frames; `all` is their number, if known.
     pub(crate) fn of_frames(all: Option<usize>, quiet: bool) -> Self {
-        Self { bar: bar(all, "mrfgs {spinner} {msg}", quiet), log: Log::new(quiet) }
+        Self { bar: bar(all, "mrfgs {spinner} {msg}", quiet), log: Log::new(quiet), what: "frames" }
     }
 
-    /// Shows the pair being matched.
-    pub(crate) fn begin_pair(&mut self, name: &str) {
+    /// Shows the pair or block being matched.
+    pub(crate) fn begin(&mut self, name: &str) {
         self.bar.set_message(name.to_owned());
-        self.log.tell(|| line(&self.bar, name));
+        self.log.tell(|| line(&self.bar, self.what, name));
     }
 
-    /// Counts a pair as finished or failed.
-    pub(crate) fn end_pair(&self) {
+    /// Counts a pair or block as finished or failed.
+    pub(crate) fn end(&self) {
         self.bar.inc(1);
     }
 
@@ -94,9 +105,9 @@ impl Counter {
     }
 }
 
-/// The line about a batch for a log.
-fn line(bar: &ProgressBar, name: &str) -> String {
-    format!("{} of {} pairs, now {name}", bar.position(), bar.length().unwrap_or_default())
+/// The line for a log.
+fn line(bar: &ProgressBar, what: &str, name: &str) -> String {
+    format!("{} of {} {what}, now {name}", bar.position(), bar.length().unwrap_or_default())
 }
 
 /// The time of the last line in the log; `None` without a log.
@@ -136,8 +147,8 @@ mod tests {
         assert!(log.is_due(start + 2 * SILENCE));
         assert!(!Log(None).is_due(start + 2 * SILENCE));
         let pairs = Counter::of_pairs(9, 2, true);
-        assert_eq!(line(&pairs.bar, "b"), "2 of 9 pairs, now b");
-        (0..3).for_each(|_| pairs.end_pair());
-        assert_eq!(line(&pairs.bar, "d"), "5 of 9 pairs, now d");
+        assert_eq!(line(&pairs.bar, pairs.what, "b"), "2 of 9 pairs, now b");
+        (0..3).for_each(|_| pairs.end());
+        assert_eq!(line(&pairs.bar, pairs.what, "d"), "5 of 9 pairs, now d");
     }
 }

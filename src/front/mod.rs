@@ -30,8 +30,7 @@ pub use prepared::Prepared;
 pub mod check {
     pub use super::parts::Part;
     pub use super::range::{beyond, goes_beyond, range, range_of_cameras, wider};
-    pub(crate) use super::warnings::of_prior;
-    pub use super::warnings::{Warning, damaged, warnings, warnings_of};
+    pub use super::warnings::{Warning, damaged, of_prior, warnings, warnings_of};
 }
 
 use crate::error::{Error, Purpose, Result};

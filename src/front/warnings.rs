@@ -404,7 +404,8 @@ pub fn warnings_of(maps: &Maps, range: DisparityRange, looks: u32) -> Vec<Warnin
 }
 
 /// The warning of a prior that the images contradict.
-pub(crate) fn of_prior(used: &PriorUse) -> Option<Warning> {
+#[must_use]
+pub fn of_prior(used: &PriorUse) -> Option<Warning> {
     (used.trust < TRUSTED).then(|| Warning::Contradicted { percent: (100.0 * used.trust).round() as usize })
 }
 

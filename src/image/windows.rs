@@ -1,7 +1,10 @@
 //! Reads pairs by windows, in the memory of a window.
 
+mod overview;
 mod spill;
 mod view;
+
+pub use overview::Overview;
 
 use std::fmt;
 use std::path::Path;

@@ -14,7 +14,7 @@ use crate::program::tiles::{Axis, Tiles};
 /// pixels, each in 2 x 2 blocks. `default`: 0.00 to 2.5 % with 32 pixels, 0.00 to 1.0 % with 64, 0.00 to 0.07 % with 128 (0.00 in the
 /// median). `fast`: 0.00 to 5.8 %, 0.00 to 7.3 %, 0.00 to 0.9 % (0.00 in the median).
 const MARGIN: usize = 128;
-/// The largest width and height of a block in pixels, so that a large pair has blocks to share, and little is lost with one of them.
+/// About the largest width and height of a block in pixels, so that a large pair has blocks to share, and little is lost with one of them.
 const LARGEST: usize = 4096;
 /// Samples in which corrections are measured lie in the middle of the parts of a grid with this many columns and rows.
 const SAMPLES: usize = 3;
@@ -33,7 +33,7 @@ pub struct Blocks {
 
 impl Blocks {
     /// The blocks of a pair of (width, height) pixels over the disparities of `range`: as many as the memory of `method` needs, with
-    /// at most 4096 x 4096 pixels each, and those that take the least time in total.
+    /// at most about 4096 x 4096 pixels each, and those that take the least time in total.
     ///
     /// # Errors
     /// [`Error::Option`] for options out of range, and [`Error::Budget`] if even the smallest block does not fit.

@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use mrfgs::image::calib::{Calibration, Camera, Unit};
+use serde::{Serialize, Serializer};
 
 /// Why the cameras are read: an output or a prior that takes them.
 pub(crate) struct CameraNeed {
@@ -13,7 +14,7 @@ pub(crate) struct CameraNeed {
 }
 
 /// Flags that give the cameras of a rectified pair in place of a calibration file.
-#[derive(clap::Args, Clone, Copy)]
+#[derive(clap::Args, Clone, Copy, Serialize)]
 pub(crate) struct CameraArgs {
     /// Focal length of the rectified pair in pixels. With --baseline it replaces --calib for depth and points; the principal point is then
     /// the centre of the image
@@ -56,6 +57,12 @@ impl CameraArgs {
 struct Baseline {
     length: f64,
     unit: Unit,
+}
+
+impl Serialize for Baseline {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        (self.length, self.unit.name()).serialize(to)
+    }
 }
 
 impl FromStr for Baseline {

@@ -9,6 +9,7 @@ pub(crate) mod recording;
 mod rectification;
 mod region;
 pub(crate) mod search;
+mod shard;
 mod sign;
 
 pub(crate) use cameras::{CameraArgs, CameraNeed, above_zero};
@@ -21,6 +22,7 @@ pub use prior::{Kind as PriorKind, LengthUnit};
 pub(crate) use reading::{ReadingArgs, disparity, scale};
 pub(crate) use recording::{RecordingArgs, Topics};
 pub(crate) use rectification::{RectificationArgs, shown};
-pub(crate) use region::{CropArgs, RegionArgs};
+pub(crate) use region::{BlockArgs, CropArgs, RegionArgs};
 pub(crate) use search::{ResolvedRange, Search, calibrated_range, depth};
+pub(crate) use shard::{Shard, shard};
 pub(crate) use sign::Sign;

@@ -63,7 +63,7 @@ impl LengthUnit {
 }
 
 /// The flags of a prior: disparities of the left view that are known before the match.
-#[derive(clap::Args, Clone)]
+#[derive(clap::Args, Clone, Serialize)]
 #[command(next_help_heading = "What is known of the scene")]
 pub(crate) struct PriorArgs {
     /// Disparities of LEFT that are known: points of a lidar or of a bundle adjustment, a terrain model, the map of the last frame
@@ -76,6 +76,8 @@ pub(crate) struct PriorArgs {
     ///
     /// With --rectify, maps and lists belong to the rectified view.
     #[arg(long, value_name = "FILE", group = KNOWN)]
+    // Not recorded here, nor is the pose: they are among the inputs.
+    #[serde(skip)]
     prior: Option<PathBuf>,
     /// Standard deviation of the known disparities, in pixels [default: 0.25 for points, 1 for surfaces]
     #[arg(long, value_name = "PIXELS", requires = KNOWN, allow_negative_numbers = true)]
@@ -92,6 +94,7 @@ pub(crate) struct PriorArgs {
     /// A text with 12 or 16 numbers, the rows of [R T]; entries R and T in YAML, JSON or as in KITTI's `calib_velo_to_cam.txt`; KITTI's
     /// `Tr_velo_to_cam` or Tr; or COLMAP's images.txt, whose first image is the left one.
     #[arg(long, value_name = "FILE", requires = KNOWN)]
+    #[serde(skip)]
     prior_pose: Option<PathBuf>,
 }
 

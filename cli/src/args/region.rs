@@ -1,7 +1,11 @@
 //! A region of the left view, and the crop of the calibrated images.
 
+use std::path::PathBuf;
+
 use mrfgs::image::Rect;
 use serde::{Serialize, Serializer};
+
+use crate::args::{Shard, shard};
 
 /// The region to match.
 #[derive(clap::Args)]
@@ -10,6 +14,23 @@ pub(crate) struct RegionArgs {
     /// smaller region takes less time
     #[arg(long, value_name = "X,Y,W,H", value_parser = region)]
     pub(crate) roi: Option<Rect>,
+}
+
+/// How a large pair is shared and resumed.
+#[derive(clap::Args)]
+pub(crate) struct BlockArgs {
+    /// Keeps the match in FOLDER, block by block: run it again to go on after a kill, or several times at once to share the work
+    ///
+    /// The pair is cut into blocks of at most about 4096 x 4096 pixels, smaller ones if --memory asks for it, each matched alone with a
+    /// margin. The blocks depend only on the pair, the disparities and the method, so the outputs have the same bytes on any number of
+    /// machines that see FOLDER. Each block goes into a file of its own. The run that finds all of them complete writes the outputs. Remove
+    /// FOLDER then. Without --blocks, only a pair that does not fit into --memory is matched in blocks, in a folder beside OUTPUT that is
+    /// removed in the end.
+    #[arg(long, value_name = "FOLDER", conflicts_with = "roi")]
+    pub(crate) blocks: Option<PathBuf>,
+    /// Matches only part K of N of the blocks (K from 1), such as 2/8, where machines share no file system with locks
+    #[arg(long, value_name = "K/N", requires = "blocks", value_parser = shard)]
+    pub(crate) shard: Option<Shard>,
 }
 
 /// The crop that the input images show.

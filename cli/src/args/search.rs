@@ -3,9 +3,7 @@
 use std::path::Path;
 use std::str::FromStr;
 
-use mrfgs::check;
 use mrfgs::depth::Rig;
-use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::{DisparityRange, MAX_DISPARITY};
 use serde::Serialize;
@@ -113,12 +111,14 @@ impl Search {
         Ok([nearest, self.max_depth.map(|depth| rig.disparity(depth).floor() as i32)])
     }
 
-    /// The range to search in `pair`, for flags that count by `sign`. `calibration` comes with its path.
+    /// The range to search in a pair of this `width`, for flags that count by `sign`. `calibration` comes with its path. `find` gives the
+    /// range of its sparse matches, with the offset of the principal points if that is known.
     pub(crate) fn range(
         &self,
-        pair: &Pair,
+        width: usize,
         calibration: Option<(&Path, &Calibration)>,
         sign: Sign,
+        find: impl FnOnce(Option<f64>) -> Result<DisparityRange>,
     ) -> Result<ResolvedRange> {
         let (max, auto) = match self.max_disparity {
             Some(Largest::Pixels(max)) => (Some(max), false),
@@ -147,16 +147,12 @@ impl Search {
         let range = if let Some(range) = given {
             range
         } else {
-            let doffs = calibration.and_then(|(_, calibration)| calibration.doffs);
-            let found = match doffs {
-                Some(doffs) => check::range_of_cameras(pair, doffs)?,
-                None => check::range(pair)?,
-            };
+            let found = find(calibration.and_then(|(_, calibration)| calibration.doffs))?;
             let [farthest, nearest] = [found.min, found.max].map(|end| sign.disparity(end));
             between(near.unwrap_or(nearest), far.unwrap_or(farthest))?
         };
         // Checked in the user's sign, so that a message quotes the user's numbers.
-        sign.range(range).within(pair.size().0)?;
+        sign.range(range).within(width)?;
         Ok(ResolvedRange { range, by_matches: given.is_none() })
     }
 }

@@ -140,6 +140,16 @@ impl Also {
         format!("--also {}", self.word)
     }
 
+    /// Whether it holds depths along the axis of the left camera.
+    pub(super) fn is_depth(&self) -> bool {
+        matches!(self.kind, Kind::Depth)
+    }
+
+    /// Whether each of its values depends on its own pixel alone, so that it can be written by bands of rows.
+    pub(crate) fn comes_by_bands(&self) -> bool {
+        !matches!(self.kind, Kind::Registered { .. } | Kind::Points(_) | Kind::Picture { .. })
+    }
+
     /// Its topic in ROS; `None` if it is never published.
     pub(super) fn topic(&self) -> Option<messages::Topic> {
         match self.kind {

@@ -1,5 +1,6 @@
 //! Flags of the outputs beside a disparity map: their selection, checks and writing.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -10,6 +11,7 @@ use mrfgs::depth::Rig;
 use mrfgs::image::cloud::PointFrame;
 use mrfgs::image::write::Writer;
 use mrfgs::image::{Plane, write};
+use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Method};
 use serde::{Serialize, Serializer};
 
@@ -265,26 +267,26 @@ impl AlsoArgs {
         self.wanted().filter_map(content).collect()
     }
 
+    /// The values of `also`, if each depends on its own pixel alone and is known.
+    fn values(&self, also: &Also, outcome: &Outcome) -> Option<Values> {
+        let &Outcome { maps, sign, rig, .. } = outcome;
+        let near = |rig: &Rig| self.limits.near(outcome.final_map(self.limits), rig);
+        match also.kind {
+            Kind::Disparity(view, map) => map(maps).map(|map| Values::Float(sign.map(map), view)),
+            Kind::Bytes(map) => Some(Values::Bytes(map(maps).clone())),
+            Kind::Depth => rig.map(|rig| Values::Float(rig.depths(&near(&rig)), View::Left)),
+            Kind::Millimetres => rig.and_then(|rig| rig.millimetres(&near(&rig)).map(Values::Words)),
+            Kind::Sigma(of) => {
+                outcome.sigmas(of, self.limits).map(|sigmas| Values::Float(sigmas, View::Left))
+            }
+            Kind::Registered { .. } | Kind::Points(_) | Kind::Picture { .. } => None,
+        }
+    }
+
     /// Writes `also` to `path`. Returns a remark for the user, if there is one.
     pub(crate) fn write(&self, also: &Also, path: &Path, outcome: &Outcome) -> Result<Option<String>> {
-        let &Outcome { maps, sign, left, rig, rectifying, third, .. } = outcome;
+        let &Outcome { maps, left, rig, rectifying, third, .. } = outcome;
         match also.kind {
-            Kind::Disparity(view, map) => {
-                let Some(map) = map(maps) else { return Ok(None) };
-                outcome.writer(view).disparity(path, &sign.map(map))?;
-            }
-            Kind::Bytes(map) => write::picture(path, map(maps))?,
-            Kind::Depth => {
-                let Some(rig) = rig else { return Ok(None) };
-                let depths = rig.depths(&self.limits.near(outcome.final_map(self.limits), &rig));
-                outcome.writer(View::Left).depth(path, &depths)?;
-                return Ok(Some(format!("depths {}", span(&depths))));
-            }
-            Kind::Millimetres => {
-                let near = |rig: &Rig| self.limits.near(outcome.final_map(self.limits), rig);
-                let Some(depths) = rig.and_then(|rig| rig.millimetres(&near(&rig))) else { return Ok(None) };
-                write::picture(path, &depths)?;
-            }
             Kind::Registered { millimetres } => {
                 let Some((rig, camera)) = rig.zip(third) else { return Ok(None) };
                 let map = self.limits.near(outcome.final_map(self.limits), &rig);
@@ -292,15 +294,11 @@ impl AlsoArgs {
                     // The georeference of the map does not apply to a third camera.
                     let depths = rig.registered(&map, &camera);
                     Writer::default().depth(path, &depths)?;
-                    return Ok(Some(format!("depths of --into {}", span(&depths))));
+                    return Ok(Some(format!("depths of --into {}", Span::of(&depths))));
                 }
                 if let Some(depths) = rig.registered_millimetres(&map, &camera) {
                     write::picture(path, &depths)?;
                 }
-            }
-            Kind::Sigma(of) => {
-                let Some(sigmas) = outcome.sigmas(of, self.limits) else { return Ok(None) };
-                outcome.writer(View::Left).depth(path, &sigmas)?;
             }
             Kind::Points(frame) => {
                 let rig = match frame {
@@ -314,16 +312,99 @@ impl AlsoArgs {
                 return Ok(Some(format!("{count} point{}", plural(count))));
             }
             Kind::Picture { beside } => write::picture(path, &self.picture(beside, outcome))?,
+            _ => match self.values(also, outcome) {
+                None => {}
+                Some(Values::Bytes(levels)) => write::picture(path, &levels)?,
+                Some(Values::Words(levels)) => write::picture(path, &levels)?,
+                Some(Values::Float(map, view)) => {
+                    outcome.writer(view).disparity(path, &map)?;
+                    return Ok(also.is_depth().then(|| format!("depths {}", Span::of(&map))));
+                }
+            },
+        }
+        Ok(None)
+    }
+
+    /// Like [`Self::write`], for maps of this size that come as bands of rows; `outcome` makes that of a band. Only for an output that
+    /// [comes by bands](Also::comes_by_bands).
+    pub(crate) fn write_in_bands(
+        &self,
+        also: &Also,
+        path: &Path,
+        size: (usize, usize),
+        bands: impl Iterator<Item = mrfgs::Result<Maps>>,
+        outcome: &dyn for<'a> Fn(&'a Maps) -> Outcome<'a>,
+    ) -> Result<Option<String>> {
+        let mut bands = bands.map(|maps| maps.map(|maps| self.values(also, &outcome(&maps)))).peekable();
+        let missing = || mrfgs::Error::write(path, "a part of the map is missing");
+        match bands.peek() {
+            Some(Ok(Some(Values::Bytes(_)))) => {
+                let mut bands = bands.map(|values| match values? {
+                    Some(Values::Bytes(levels)) => Ok(levels),
+                    _ => Err(missing()),
+                });
+                write::picture_in_bands(path, size, &mut bands)?;
+            }
+            Some(Ok(Some(Values::Words(_)))) => {
+                let mut bands = bands.map(|values| match values? {
+                    Some(Values::Words(levels)) => Ok(levels),
+                    _ => Err(missing()),
+                });
+                write::picture_in_bands(path, size, &mut bands)?;
+            }
+            Some(Ok(Some(Values::Float(_, view)))) => {
+                let (view, mut span) = (*view, Span::default());
+                let mut bands = bands.map(|values| match values? {
+                    Some(Values::Float(map, _)) => {
+                        span.add(&map);
+                        Ok(map)
+                    }
+                    _ => Err(missing()),
+                });
+                let nothing = Maps::blank((1, 1), false);
+                outcome(&nothing).writer(view).disparity_in_bands(path, size, &mut bands)?;
+                return Ok(also.is_depth().then(|| format!("depths {span}")));
+            }
+            // Without cameras, there is nothing to write.
+            Some(Ok(None)) | None => {}
+            Some(Err(e)) => return Err(e.clone().into()),
         }
         Ok(None)
     }
 }
 
+/// The values of an output.
+enum Values {
+    /// Disparities, depths or errors, in the pixels of a view.
+    Float(Plane<f32>, View),
+    Bytes(Plane<u8>),
+    Words(Plane<u16>),
+}
+
 /// The smallest and the largest known depth.
-fn span(depths: &Plane<f32>) -> String {
-    let known = || depths.data().iter().copied().filter(|depth| depth.is_finite());
-    match known().reduce(f32::min).zip(known().reduce(f32::max)) {
-        Some((least, most)) => format!("{least:.3} to {most:.3}"),
-        None => "of no pixel".into(),
+#[derive(Clone, Copy, Default)]
+struct Span(Option<(f32, f32)>);
+
+impl Span {
+    fn of(depths: &Plane<f32>) -> Self {
+        let mut span = Self::default();
+        span.add(depths);
+        span
+    }
+
+    fn add(&mut self, depths: &Plane<f32>) {
+        for &depth in depths.data().iter().filter(|depth| depth.is_finite()) {
+            let (least, most) = self.0.unwrap_or((depth, depth));
+            self.0 = Some((least.min(depth), most.max(depth)));
+        }
+    }
+}
+
+impl fmt::Display for Span {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some((least, most)) => write!(f, "{least:.3} to {most:.3}"),
+            None => f.write_str("of no pixel"),
+        }
     }
 }

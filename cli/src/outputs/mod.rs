@@ -25,7 +25,7 @@ pub(crate) use film::Film;
 pub(crate) use map_args::{Format, MapArgs};
 pub(crate) use messages::Cameras;
 pub(crate) use outcome::{Outcome, View};
-pub(crate) use record::{Files, MatchRecord, stage_and_level};
+pub(crate) use record::{Files, Found, MatchRecord, Tally, stage_and_level};
 pub(crate) use recording::RecordedMaps;
 pub(crate) use staged::StagedFolder;
 pub(crate) use viewer::ShownMaps;

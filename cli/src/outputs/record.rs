@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use mrfgs::maps::{FRACTION, flag, has_disparity};
+use mrfgs::maps::{FRACTION, Maps, flag, has_disparity};
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::prior::PriorUse;
 use mrfgs::rectification::Trust;
-use mrfgs::{Matched, Timing};
+use mrfgs::{Conditioning, Matched, Timing};
 use serde::Serialize;
 
 use crate::args::Sign;
@@ -50,6 +50,9 @@ pub(crate) struct MatchRecord<'a> {
     driver: Option<&'a str>,
     note: Option<String>,
     tiles: usize,
+    /// Number of blocks, if the pair was matched in blocks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    blocks: Option<usize>,
     /// How far the right view was shifted up, in pixels.
     moved_up: f64,
     /// How much the left and the right view were smoothed, in pixels.
@@ -68,17 +71,82 @@ pub(crate) struct MatchRecord<'a> {
     mean_confidence: Option<f64>,
 }
 
+/// What a match has found beside its maps.
+pub(crate) struct Found<'a> {
+    pub(crate) method: &'a Method,
+    pub(crate) range: DisparityRange,
+    pub(crate) ran_on: &'a str,
+    pub(crate) driver: Option<&'a str>,
+    pub(crate) note: Option<String>,
+    /// The tiles of the block with the most.
+    pub(crate) tiles: usize,
+    pub(crate) blocks: usize,
+    pub(crate) conditioning: Conditioning,
+    pub(crate) prior: Option<PriorUse>,
+    pub(crate) iterations: u32,
+    pub(crate) timings: &'a [Timing],
+}
+
+impl<'a> Found<'a> {
+    fn of(matched: &'a Matched) -> Self {
+        Self {
+            method: &matched.plan.method,
+            range: matched.range(),
+            ran_on: &matched.ran_on,
+            driver: matched.driver.as_deref(),
+            note: matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)),
+            tiles: matched.tiles.count(),
+            blocks: matched.blocks,
+            conditioning: matched.conditioning,
+            prior: matched.prior,
+            iterations: matched.iterations,
+            timings: &matched.timings,
+        }
+    }
+}
+
+/// Counts of the pixels of maps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Tally {
+    all: usize,
+    measured: usize,
+    filled: usize,
+    /// Sum of the confidences of measured pixels.
+    confidence: u64,
+}
+
+impl Tally {
+    /// Adds the pixels of `maps`.
+    pub(crate) fn add(&mut self, maps: &Maps) {
+        for (&validity, &confidence) in maps.validity.data().iter().zip(maps.confidence.data()) {
+            self.all += 1;
+            if validity & flag::FILLED != 0 {
+                self.filled += 1;
+            } else if has_disparity(validity) {
+                self.measured += 1;
+                self.confidence += u64::from(confidence);
+            }
+        }
+    }
+}
+
 impl<'a> MatchRecord<'a> {
     pub(crate) fn new(files: &'a Files, matched: &'a Matched, time: Duration, sign: Sign) -> Self {
-        let Matched { maps, plan, .. } = matched;
-        let (width, height) = maps.disparity.size();
-        let percent = |count: usize| 100.0 * count as f64 / (width * height) as f64;
-        let filled = maps.validity.data().iter().filter(|&v| v & flag::FILLED != 0).count();
-        let measured = |validity: u8| has_disparity(validity) && validity & flag::FILLED == 0;
-        let pixels = maps.validity.data().iter().zip(maps.confidence.data());
-        let (count, sum) = pixels
-            .filter(|(validity, _)| measured(**validity))
-            .fold((0, 0), |(count, sum), (_, confidence)| (count + 1, sum + u64::from(*confidence)));
+        let mut tally = Tally::default();
+        tally.add(&matched.maps);
+        Self::of(files, Found::of(matched), matched.maps.disparity.size(), tally, time, sign)
+    }
+
+    /// The record of maps of this size.
+    pub(crate) fn of(
+        files: &'a Files,
+        found: Found<'a>,
+        (width, height): (usize, usize),
+        tally: Tally,
+        time: Duration,
+        sign: Sign,
+    ) -> Self {
+        let percent = |count: usize| 100.0 * count as f64 / tally.all as f64;
         let ms = |time: Duration| 1000.0 * time.as_secs_f64();
         Self {
             version: env!("CARGO_PKG_VERSION"),
@@ -89,23 +157,24 @@ impl<'a> MatchRecord<'a> {
             width,
             height,
             sign,
-            range: sign.range(matched.range()),
-            labels: matched.range().labels(),
-            method: &plan.method,
-            ran_on: &matched.ran_on,
-            driver: matched.driver.as_deref(),
-            note: matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)),
-            tiles: matched.tiles.count(),
-            moved_up: f64::from(matched.conditioning.offset) / f64::from(FRACTION),
-            smoothed: matched.conditioning.smoothing,
-            prior: matched.prior,
-            iterations: matched.iterations,
+            range: sign.range(found.range),
+            labels: found.range.labels(),
+            method: found.method,
+            ran_on: found.ran_on,
+            driver: found.driver,
+            note: found.note,
+            tiles: found.tiles,
+            blocks: (found.blocks > 1).then_some(found.blocks),
+            moved_up: f64::from(found.conditioning.offset) / f64::from(FRACTION),
+            smoothed: found.conditioning.smoothing,
+            prior: found.prior,
+            iterations: found.iterations,
             seconds: time.as_secs_f64(),
-            stages: matched.timings.iter().map(|t| (stage_and_level(t), ms(t.time))).collect(),
-            density: percent(count + filled),
-            measured: percent(count),
-            filled: percent(filled),
-            mean_confidence: (count > 0).then(|| sum as f64 / count as f64),
+            stages: found.timings.iter().map(|t| (stage_and_level(t), ms(t.time))).collect(),
+            density: percent(tally.measured + tally.filled),
+            measured: percent(tally.measured),
+            filled: percent(tally.filled),
+            mean_confidence: (tally.measured > 0).then(|| tally.confidence as f64 / tally.measured as f64),
         }
     }
 }

@@ -19,6 +19,7 @@ use crate::failure::{self, Failure, Result};
 use crate::matching::SearchSpace;
 use crate::outputs::Files;
 use crate::pairs::folder::CALIBRATION;
+use crate::pairs::large::{LargePair, UnreadPair};
 use crate::pairs::list;
 use crate::remedy;
 
@@ -86,9 +87,53 @@ impl Calib<'_> {
     }
 }
 
+/// The views of a pair, in memory or in files.
+pub(crate) trait Views {
+    /// (width, height) in pixels.
+    fn size(&self) -> (usize, usize);
+
+    /// The range of disparities by sparse matches; `doffs` is the offset of the principal points, if that is known.
+    fn range(&self, doffs: Option<f64>) -> mrfgs::Result<DisparityRange>;
+}
+
+impl Views for Pair {
+    fn size(&self) -> (usize, usize) {
+        self.size()
+    }
+
+    fn range(&self, doffs: Option<f64>) -> mrfgs::Result<DisparityRange> {
+        match doffs {
+            Some(doffs) => check::range_of_cameras(self, doffs),
+            None => check::range(self),
+        }
+    }
+}
+
+impl Views for LargePair {
+    fn size(&self) -> (usize, usize) {
+        self.size()
+    }
+
+    fn range(&self, doffs: Option<f64>) -> mrfgs::Result<DisparityRange> {
+        self.range(doffs)
+    }
+}
+
+impl Views for UnreadPair<'_> {
+    fn size(&self) -> (usize, usize) {
+        self.size()
+    }
+
+    fn range(&self, doffs: Option<f64>) -> mrfgs::Result<DisparityRange> {
+        self.range(doffs)
+    }
+}
+
 /// A pair with its range and calibration.
-pub(crate) struct Input {
-    pub(crate) pair: Pair,
+pub(crate) struct Input<V = Pair> {
+    pub(crate) pair: V,
+    /// (width, height) of the whole views in pixels.
+    pub(crate) size: (usize, usize),
     pub(crate) range: DisparityRange,
     /// Whether the range was estimated from sparse matches.
     by_matches: bool,
@@ -113,6 +158,32 @@ struct KnownCalibration {
 }
 
 impl KnownCalibration {
+    /// The calibration of rectified images of this `size`: that of `calib`, else of the flags (`numbers`), else of the calib.txt `beside`
+    /// the left image if given.
+    fn of_rectified(
+        calib: Calib,
+        numbers: Option<&CameraArgs>,
+        beside: Option<&Path>,
+        size: (usize, usize),
+    ) -> Result<Option<Self>> {
+        let files = calib.names();
+        Ok(if !calib.is_empty() {
+            let calibration = of_rectified(&calib.read()?, &files, size)?;
+            Some(Self { files, calibration })
+        } else if let Some(calibration) = numbers.and_then(|numbers| numbers.calibration(size)) {
+            Some(Self { files, calibration })
+        } else if let Some(left) = beside {
+            let files = self::beside(left);
+            // --calib-crop only applies to --calib.
+            let whole = CropArgs::default();
+            let read = |files: &Vec<PathBuf>| of_rectified_images(files, &whole, size);
+            let calibration = files.as_ref().map(read).transpose()?;
+            files.zip(calibration).map(|(files, calibration)| Self { files, calibration })
+        } else {
+            None
+        })
+    }
+
     /// The calibration with the file name for messages.
     fn named(&self) -> (&Path, &Calibration) {
         (self.files.first().map_or(Path::new(NUMBERS), PathBuf::as_path), &self.calibration)
@@ -146,8 +217,26 @@ impl PairArgs {
             let (by, pair) = rectify_alone([&self.left, self.right()], &pair, options)?;
             return Input::rectified_alone(pair, by, &self.search, sign);
         }
-        let beside = Some(&*self.left).filter(|_| cameras || self.search.takes_calibration());
+        let beside = self.beside(cameras);
         Input::new(pair, &self.search, sign, Calib::Files(&self.calib, &self.crop), numbers, rectify, beside)
+    }
+
+    /// Like [`Self::read`], for rectified images that are not read yet: their `views` read what is needed.
+    pub(crate) fn of_views<V: Views>(
+        &self,
+        views: V,
+        sign: Sign,
+        cameras: bool,
+        numbers: Option<&CameraArgs>,
+    ) -> Result<Input<V>> {
+        let calib = Calib::Files(&self.calib, &self.crop);
+        let calibration = KnownCalibration::of_rectified(calib, numbers, self.beside(cameras), views.size())?;
+        Input::with_range(views, &self.search, sign, calibration, numbers, None)
+    }
+
+    /// The left image, if a calib.txt beside it counts.
+    fn beside(&self, cameras: bool) -> Option<&Path> {
+        Some(&*self.left).filter(|_| cameras || self.search.takes_calibration())
     }
 
     /// Assigns the positional arguments: see [`behind_views`].
@@ -161,7 +250,7 @@ impl PairArgs {
     }
 
     /// The paths for a record.
-    pub(crate) fn files(&self, input: &Input, output: Option<&Path>) -> Files {
+    pub(crate) fn files<V>(&self, input: &Input<V>, output: Option<&Path>) -> Files {
         let path = |path: &Path| path.display().to_string();
         Files {
             left: path(&self.left),
@@ -174,7 +263,7 @@ impl PairArgs {
     }
 
     /// The files that no output may overwrite, each with its name.
-    pub(crate) fn inputs<'a>(&'a self, input: &'a Input) -> Vec<(&'static str, &'a Path)> {
+    pub(crate) fn inputs<'a, V>(&'a self, input: &'a Input<V>) -> Vec<(&'static str, &'a Path)> {
         let mut inputs = vec![("LEFT", self.left.as_path())];
         inputs.extend(self.right.as_deref().map(|path| ("RIGHT", path)));
         inputs.extend(self.mask.as_deref().map(|path| ("the mask", path)));
@@ -203,36 +292,45 @@ impl Input {
             (by, pair) = self::rectify(&calib.read()?, &files, &pair, options)?;
             let calibration = rectification.insert(by).calibration()?;
             Some(KnownCalibration { files, calibration })
-        } else if !calib.is_empty() {
-            let calibration = of_rectified(&calib.read()?, &files, pair.size())?;
-            Some(KnownCalibration { files, calibration })
-        } else if let Some(calibration) = numbers.and_then(|numbers| numbers.calibration(pair.size())) {
-            Some(KnownCalibration { files, calibration })
-        } else if let Some(left) = beside {
-            let files = self::beside(left);
-            // --calib-crop only applies to --calib.
-            let whole = CropArgs::default();
-            let read = |files: &Vec<PathBuf>| of_rectified_images(files, &whole, pair.size());
-            let calibration = files.as_ref().map(read).transpose()?;
-            files.zip(calibration).map(|(files, calibration)| KnownCalibration { files, calibration })
         } else {
-            None
+            KnownCalibration::of_rectified(calib, numbers, beside, pair.size())?
         };
-        let known = calibration.as_ref().map(KnownCalibration::named);
-        let ResolvedRange { range, by_matches } = search.range(&pair, known, sign)?;
+        Self::with_range(pair, search, sign, calibration, numbers, rectification)
+    }
+
+    /// The input for a pair that `by` rectified without a calibration, with the range to `search`, counted by `sign`.
+    fn rectified_alone(pair: Pair, by: Rectification, search: &Search, sign: Sign) -> Result<Self> {
+        Self::with_range(pair, search, sign, None, None, Some(by))
+    }
+}
+
+impl<V: Views> Input<V> {
+    /// The input for views with this `calibration` and `rectification`, and the range to `search`, counted by `sign`.
+    fn with_range(
+        pair: V,
+        search: &Search,
+        sign: Sign,
+        calibration: Option<KnownCalibration>,
+        numbers: Option<&CameraArgs>,
+        rectification: Option<Rectification>,
+    ) -> Result<Self> {
+        let (known, size) = (calibration.as_ref().map(KnownCalibration::named), pair.size());
+        let ResolvedRange { range, by_matches } =
+            search.range(size.0, known, sign, |doffs| Ok(pair.range(doffs)?))?;
         let remedy = match numbers {
             Some(_) => "give one with --calib, or --focal and --baseline",
             None => "give one with --calib",
         };
         let by_depth = search.takes_cameras().is_some();
-        Ok(Self { pair, range, by_matches, calibration, by_depth, remedy, rectification })
+        Ok(Self { pair, size, range, by_matches, calibration, by_depth, remedy, rectification })
     }
+}
 
-    /// The input for a pair that `by` rectified without a calibration, with the range to `search`, counted by `sign`.
-    fn rectified_alone(pair: Pair, by: Rectification, search: &Search, sign: Sign) -> Result<Self> {
-        let ResolvedRange { range, by_matches } = search.range(&pair, None, sign)?;
-        let (rectification, remedy) = (Some(by), "give one with --calib");
-        Ok(Self { pair, range, by_matches, by_depth: false, calibration: None, remedy, rectification })
+impl<V> Input<V> {
+    /// The same input with other views of the same pair, such as a window of them.
+    pub(crate) fn with_views<W>(self, change: impl FnOnce(V) -> Result<W>) -> Result<Input<W>> {
+        let Self { pair, size, range, by_matches, calibration, by_depth, remedy, rectification } = self;
+        Ok(Input { pair: change(pair)?, size, range, by_matches, calibration, by_depth, remedy, rectification })
     }
 
     /// The files of the calibration, for a record.
@@ -245,7 +343,7 @@ impl Input {
     /// # Errors
     /// If it is not inside the view.
     pub(crate) fn region(&self, part: &Rect) -> Result<Region> {
-        let region = Region::new(part.clone(), self.pair.size(), self.range);
+        let region = Region::new(part.clone(), self.size, self.range);
         region.map_err(|e| Failure::usage("--roi", e))
     }
 
@@ -279,7 +377,7 @@ impl Input {
             }
         }
         let known = self.calibration.as_ref().map(KnownCalibration::named);
-        let found = need.map(|need| rig(need, known, left, self.pair.size(), self.remedy)).transpose()?;
+        let found = need.map(|need| rig(need, known, left, self.size, self.remedy)).transpose()?;
         Ok(match self.rectifying() {
             Some(rectifying) => found.map(|rig| rig.rectified_by(&rectifying)),
             None => found,
@@ -329,38 +427,56 @@ impl Input {
         }
     }
 
-    /// Prints warnings about the pair, or about its `region`.
-    pub(crate) fn warn(&self, region: Option<&Region>) {
+    /// Prints `warnings` about the pair, after those about its calibration.
+    fn say_all(&self, warnings: &[Warning]) {
         if let Some(trust) = self.rectification.as_ref().and_then(Rectification::trust) {
             console::say(&trusted(trust));
         }
-        let window = region.map(|region| region.window_of(&self.pair));
-        let warnings = self.warnings_of(window.as_ref().unwrap_or(&self.pair), &remedy::FLAGS);
-        for warning in &warnings {
+        for warning in &self.in_words(warnings, &remedy::FLAGS) {
             say(warning);
         }
     }
 
-    /// Warnings about the pair and its calibration, in the vocabulary `words`.
-    pub(crate) fn warnings(&self, words: &remedy::Vocabulary) -> Vec<String> {
-        self.warnings_of(&self.pair, words)
-    }
-
-    fn warnings_of(&self, pair: &Pair, words: &remedy::Vocabulary) -> Vec<String> {
+    /// Warnings about the calibration, and `warnings` about the pair, in the vocabulary `words`.
+    fn in_words(&self, warnings: &[Warning], words: &remedy::Vocabulary) -> Vec<String> {
         let mut said = Vec::new();
         let files = self.calibration.as_ref().map_or(&[][..], |known| &known.files);
         if let Some(by) = &self.rectification {
             said.extend(doubts(by, files));
         } else if let Some(known) = &self.calibration {
-            said.extend(doubts_of(known.named(), self.pair.size()));
+            said.extend(doubts_of(known.named(), self.size));
         }
-        // Check the range only if the user chose it; an estimated one says nothing about the pair.
-        let warnings = check::warnings(pair, (!self.by_matches).then_some(self.range));
         said.extend(warnings.iter().map(|warning| match self.rectification {
             Some(_) => remedy::of_rectified(warning, self.calibration.is_some(), words),
             None => remedy::warning(warning, words),
         }));
         said
+    }
+
+    /// The range, if the user chose it: an estimated one says nothing about the pair.
+    fn chosen(&self) -> Option<DisparityRange> {
+        (!self.by_matches).then_some(self.range)
+    }
+}
+
+impl Input {
+    /// Prints warnings about the pair, or about its `region`.
+    pub(crate) fn warn(&self, region: Option<&Region>) {
+        let window = region.map(|region| region.window_of(&self.pair));
+        self.say_all(&check::warnings(window.as_ref().unwrap_or(&self.pair), self.chosen()));
+    }
+
+    /// Warnings about the pair and its calibration, in the vocabulary `words`.
+    pub(crate) fn warnings(&self, words: &remedy::Vocabulary) -> Vec<String> {
+        self.in_words(&check::warnings(&self.pair, self.chosen()), words)
+    }
+}
+
+impl Input<LargePair> {
+    /// Prints warnings about the pair.
+    pub(crate) fn warn(&self) -> Result<()> {
+        self.say_all(&self.pair.warnings(self.chosen())?);
+        Ok(())
     }
 }
 

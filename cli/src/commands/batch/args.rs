@@ -4,10 +4,8 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::args::{CropArgs, ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs};
+use crate::args::{CropArgs, ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, Shard, shard};
 use crate::outputs::MapArgs;
-
-use super::shard::{Shard, shard};
 
 const EXAMPLES: &str = "\
 Examples:

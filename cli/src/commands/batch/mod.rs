@@ -3,7 +3,6 @@
 mod args;
 mod listed;
 mod request;
-mod shard;
 
 use std::collections::{HashSet, VecDeque};
 use std::error::Error as _;
@@ -174,7 +173,7 @@ impl<'a> Batch<'a> {
         let mut taken = 0;
         while let Some(listed) = left.pop_front() {
             let name = listed.name.as_str();
-            bar.begin_pair(name);
+            bar.begin(name);
             let interrupted = || {
                 let finished = skipped + done + failed.len();
                 Failure::Stopped(format!("stopped after {finished} of {all}; run it again to resume"))
@@ -195,7 +194,7 @@ impl<'a> Batch<'a> {
                 Ok(Some(_)) if self.state(listed) == State::Complete => {
                     // Another run has matched it in the meantime.
                     skipped += 1;
-                    bar.end_pair();
+                    bar.end();
                     continue;
                 }
                 Ok(Some(claim)) => self.pair(listed, &claim, &mut matcher),
@@ -223,7 +222,7 @@ impl<'a> Batch<'a> {
                     bar.past(|| console::say(&format!("{name}: {}", failure.message(&remedy::COLUMNS))));
                 }
             }
-            bar.end_pair();
+            bar.end();
         }
         drop(bar);
         let summary = format!("{done} done, {skipped} skipped, {} failed", failed.len());

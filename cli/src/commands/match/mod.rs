@@ -1,21 +1,31 @@
 //! `mrfgs match`.
 
-use std::path::{Path, PathBuf};
+mod in_blocks;
 
-use mrfgs::Matcher;
-use mrfgs::image::{Pair, pfm, write};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use mrfgs::calibration::cameras::ThirdCamera;
+use mrfgs::image::{Pair, Rect, pfm, write};
 use mrfgs::low_level::plan::Plan;
-use mrfgs::options::DisparityRange;
+use mrfgs::low_level::program::tiles::Tiles;
+use mrfgs::options::{DisparityRange, Method};
+use mrfgs::rectification::Options;
+use mrfgs::region::{Blocks, Region};
 use mrfgs::sigma::Sigma;
+use mrfgs::{Matcher, check};
 
 use crate::args::{
-    CameraArgs, ExecutionArgs, MethodArgs, PriorArgs, PriorView, RectificationArgs, RegionArgs, Sign,
+    BlockArgs, CameraArgs, CameraNeed, ExecutionArgs, MethodArgs, PriorArgs, PriorView, RectificationArgs, RegionArgs,
+    Sign,
 };
 use crate::failure::{Failure, Result};
 use crate::outputs::{
     Also, AlsoArgs, Files, InFront, MatchRecord, Outcome, View, Written, files, other_sign,
 };
-use crate::pairs::input::{self, Input, PairArgs};
+use crate::pairs::input::{self, Input, PairArgs, Views};
+use crate::pairs::large::{LargePair, PairFiles, UnreadPair};
 use crate::{console, matching, plan, stop};
 
 const EXAMPLES: &str = "\
@@ -37,6 +47,8 @@ Examples:
   mrfgs match im0.png im1.png d.pfm --also depth,points
   # Part of a large pair:
   mrfgs match l.tif r.tif d.tif --max-disparity 255 --roi 4000,2500,800,600
+  # A pair larger than memory; run it again to resume, and on many machines:
+  mrfgs match l.tif r.tif d.tif --max-disparity 255 --blocks job
   # Depth without a calibration file:
   mrfgs match l.png r.png d.pfm --focal 700 --baseline 120mm --also depth
   # Both views in one file of a stereo camera:
@@ -73,6 +85,8 @@ pub(crate) struct Args {
     #[command(flatten)]
     region: RegionArgs,
     #[command(flatten)]
+    blocks: BlockArgs,
+    #[command(flatten)]
     numbers: CameraArgs,
     /// Disparity map to write: .pfm, .tif, .tiff or .png, or `-`
     output: Option<PathBuf>,
@@ -107,7 +121,7 @@ pub(crate) struct Args {
     /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `prior`, `output`), `rectified`, `trust` (rectified
     /// without a calibration: `matches`, `agreeing`, `median` and `percentile95` of the row errors in pixels, `coverage` and
     /// `off_one_plane` from 0 to 1), `region` (first column and row in LEFT, with --roi), `width`, `height`, `sign`, `range` (`min`,
-    /// `max`), `labels`, `method` (every key), `ran_on`, `driver` (of the device), `note` (why another device was used), `tiles`,
+    /// `max`), `labels`, `method` (every key), `ran_on`, `driver` (of the device), `note` (why another device was used), `tiles`, `blocks` (with more than one),
     /// `moved_up` (shift of the right view in pixels), `smoothed` (standard deviations for the left and the right view, in pixels), `prior`
     /// (`kind`, `given` and `dropped` pixels, `trust` from 0 to 1; with --prior), `iterations` and `seconds` (of the match). `density` is the share of pixels with a disparity (%), the sum of `measured` and
     /// `filled`. `mean_confidence` averages over measured pixels.
@@ -121,30 +135,140 @@ impl Args {
     }
 }
 
+/// The command line, checked.
+struct Request<'a> {
+    args: &'a Args,
+    method: Method,
+    /// How raw images are rectified, if they are.
+    rectifying: Option<Options>,
+    /// An output that needs the cameras, if there is one.
+    cameras: Option<&'static Also>,
+    /// What needs the cameras: an output or a prior.
+    need: Option<CameraNeed>,
+    /// The camera of `--into`.
+    third: Option<ThirdCamera>,
+}
+
+impl<'a> Request<'a> {
+    fn new(args: &'a Args) -> Result<Self> {
+        let method = args.also.made_by(args.method.method()?)?;
+        let cameras = args.also.take_cameras();
+        let rectifying = args.rectification.options_if(args.rectify)?;
+        args.also.check(args.rectify)?;
+        let third = args.also.third()?;
+        let need = cameras.map(Also::need).or_else(|| args.prior.need());
+        if args.rectify && args.pair.calib.is_empty() {
+            let flag = need.as_ref().map(|need| need.flag.clone());
+            let flag = flag.or(args.numbers.flag().map(str::to_owned));
+            if let Some(flag) = flag {
+                let reason = "without a calibration there is no scale and so no depth; add --calib FILE";
+                return Err(Failure::usage(flag, reason));
+            }
+        }
+        Ok(Self { args, method, rectifying, cameras, need, third })
+    }
+
+    /// The whole pair.
+    fn input(&self) -> Result<Input> {
+        let Self { args, need, rectifying, .. } = self;
+        args.pair.read(args.sign, need.is_some(), Some(&args.numbers), rectifying.as_ref())
+    }
+
+    /// The pair as `views` that are read when needed.
+    fn input_of<V: Views>(&self, views: V) -> Result<Input<V>> {
+        self.args.pair.of_views(views, self.args.sign, self.need.is_some(), Some(&self.args.numbers))
+    }
+
+    /// The files of a pair that can be read by windows; `None` for raw pairs and files with both views, which are read whole.
+    fn files(&self) -> Option<PairFiles<'_>> {
+        let right = self.args.pair.right.as_deref().filter(|_| self.rectifying.is_none())?;
+        Some(PairFiles { reader: self.args.pair.reading.reader(), left: &self.args.pair.left, right, mask: self.args.pair.mask.as_deref() })
+    }
+
+    /// The folder for files that exist as long as this program needs them.
+    fn scratch(&self) -> PathBuf {
+        let output = self.args.output();
+        if files::is_printed(output) { std::env::temp_dir() } else { files::parent(output).to_owned() }
+    }
+
+    /// Whether the pair is matched in blocks: where the user says so, and where a pair of its size does not fit into the memory.
+    fn goes_by_blocks(&self) -> Result<bool> {
+        if self.args.blocks.blocks.is_some() {
+            return Ok(true);
+        }
+        // Errors of the files are reported when these are read.
+        let Some(Ok((width, height))) = self.files().map(|files| files.reader.size(files.left)) else { return Ok(false) };
+        let least = Plan::new(width, height, DisparityRange::new(0, 0)?, &self.method)?;
+        Ok(self.args.region.roi.is_none() && Tiles::new(&least).is_err())
+    }
+}
+
 pub(crate) fn run(mut args: Args) -> Result<()> {
     args.pair.leave(&mut args.output)?;
     if args.output.is_none() {
         return Err(Failure::usage("OUTPUT", "missing; give a file for the map, such as disparity.pfm"));
     }
-    let args = &args;
-    let execution = args.execution.execution();
     stop::listen();
-    let method = args.also.made_by(args.method.method()?)?;
-    let cameras = args.also.take_cameras();
-    let rectifying = args.rectification.options_if(args.rectify)?;
-    args.also.check(args.rectify)?;
-    let third = args.also.third()?;
-    let need = cameras.map(Also::need).or_else(|| args.prior.need());
-    if args.rectify && args.pair.calib.is_empty() {
-        let flag = need.as_ref().map(|need| need.flag.clone());
-        let flag = flag.or(args.numbers.flag().map(str::to_owned));
-        if let Some(flag) = flag {
-            let reason = "without a calibration there is no scale and so no depth; add --calib FILE";
-            return Err(Failure::usage(flag, reason));
+    let request = Request::new(&args)?;
+    if args.dry_run && let Some(files) = request.files() {
+        return dry_run(&request, files);
+    }
+    if request.goes_by_blocks()? {
+        return in_blocks::run(&request);
+    }
+    match (&args.region.roi, request.files()) {
+        (Some(part), Some(files)) => {
+            let (input, read) = stop::at_once(|| window_of(&request, files, part))?;
+            run_on(&request, input, read)
+        }
+        _ => {
+            let input = stop::at_once(|| request.input())?;
+            let whole = Rect::whole(input.size);
+            run_on(&request, input, whole)
         }
     }
-    let read = || args.pair.read(args.sign, need.is_some(), Some(&args.numbers), rectifying.as_ref());
-    let input = stop::at_once(read)?;
+}
+
+/// The window of the pair that a match of the region `part` reads, and where it is.
+fn window_of(request: &Request, files: PairFiles, part: &Rect) -> Result<(Input, Rect)> {
+    let large = LargePair::of_files(files.open(&request.scratch())?, &request.method);
+    let input = request.input_of(large)?;
+    // A second match may search a wider range.
+    let widest = check::beyond(input.range).filter(|_| input.has_found_range()).unwrap_or(input.range);
+    input.region(part)?;
+    let window = Region::new(part.clone(), input.size, widest)?.window().clone();
+    Ok((input.with_views(|large| Ok(large.window(&window)?))?, window))
+}
+
+/// Prints the plan of a match, from the headers of the files alone where the range is given.
+fn dry_run(request: &Request, files: PairFiles) -> Result<()> {
+    let args = request.args;
+    let views = UnreadPair::new(files, &request.method, request.scratch())?;
+    let input = stop::at_once(|| request.input_of(views))?;
+    if !args.quiet {
+        input.say_range(args.sign, "");
+    }
+    let known = input.rig(request.need.as_ref(), &args.pair.left)?;
+    let region = args.region.roi.as_ref().map(|part| input.region(part)).transpose()?;
+    check_outputs(args, &input)?;
+    let view = PriorView { size: input.size, sign: args.sign, rig: input.as_taken(known) };
+    let prior = args.prior.read(view)?;
+    let (width, height) = region.as_ref().map_or(input.size, |region| region.window().size());
+    let plan = Plan::new(width, height, input.range, &request.method)?.with_prior(prior.is_some());
+    if args.blocks.blocks.is_none() && Tiles::new(&plan).is_ok() {
+        return Ok(console::print(&plan::describe(&plan)?)?);
+    }
+    let blocks = Blocks::new(input.size, input.range, &request.method)?;
+    let mut text = plan::describe_blocks(&blocks, input.range, &request.method)?;
+    if let Some((complete, all)) = in_blocks::progress(request, &blocks)? {
+        let _ = writeln!(text, "\n{complete} of {all} blocks are complete");
+    }
+    Ok(console::print(&text)?)
+}
+
+/// Matches a pair, or a region of it; `read` is the part of the views that was read.
+fn run_on(request: &Request, input: Input, read: Rect) -> Result<()> {
+    let Request { args, method, cameras, need, third, .. } = request;
     let range = input.range;
     if !args.quiet {
         input.say_range(args.sign, "");
@@ -152,27 +276,31 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     let known = input.rig(need.as_ref(), &args.pair.left)?;
     let mut rig = known.filter(|_| cameras.is_some());
     let part = args.region.roi.as_ref();
-    let region = part.map(|part| input.region(part)).transpose()?;
+    part.map(|part| input.region(part)).transpose()?;
+    // The region in the pixels that were read.
+    let inner = part.map(|part| part.within(&read));
+    let region = inner.clone().map(|inner| Region::new(inner, input.pair.size(), range)).transpose()?;
     let also = check_outputs(args, &input)?;
     if !args.quiet {
         input.warn(region.as_ref());
     }
-    let (width, height) = region.as_ref().map_or(input.pair.size(), |region| region.window().size());
-    let view = PriorView { size: input.pair.size(), sign: args.sign, rig: input.as_taken(known) };
+    let (width, height) = region.as_ref().map_or(input.size, |region| region.window().size());
+    let view = PriorView { size: input.size, sign: args.sign, rig: input.as_taken(known) };
     let prior = args.prior.read(view)?;
-    let plan = Plan::new(width, height, range, &method)?.with_prior(prior.is_some());
+    let prior = prior.map(|prior| if read == Rect::whole(input.size) { prior } else { Arc::new(prior.crop(&read)) });
     if args.dry_run {
+        let plan = Plan::new(width, height, range, method)?.with_prior(prior.is_some());
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
-    let mut matcher = Matcher::builder().execution(execution).build()?;
+    let mut matcher = Matcher::builder().execution(args.execution.execution()).build()?;
     let searched = input.searched(|wider| check_range(args, wider).is_ok());
-    let searched = searched.in_region(part).with_prior(prior.as_ref());
+    let searched = searched.in_region(inner.as_ref()).with_prior(prior.as_ref());
     let (matched, time) =
-        matching::run(&mut matcher, &input.pair, searched, &method, None, args.quiet, None)?;
+        matching::run(&mut matcher, &input.pair, searched, method, None, args.quiet, None)?;
     let range = matched.range();
     let mut pair = input.pair.clone();
-    if let Some(part) = part {
-        pair = pair.crop(part);
+    if let Some((part, inner)) = part.zip(inner) {
+        pair = pair.crop(&inner);
         rig = rig.map(|rig| rig.of_part(part.x.start, part.y.start));
     }
     if !args.quiet {
@@ -181,8 +309,7 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     }
     // Free its memory for the outputs.
     drop(matcher);
-    let prior_file = args.prior.file().map(|path| path.display().to_string());
-    let files = Files { prior: prior_file, ..args.pair.files(&input, Some(args.output())) };
+    let files = record_files(args, &input);
     let unit = input.unit();
     let georeferences = pair.georeferences();
     let is_found = input.has_found_range();
@@ -191,20 +318,34 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     drop(input);
     let pair = Some(pair).filter(|_| args.also.show_left());
     let left = pair.as_ref().map(Pair::left);
-    let (maps, sign, sigma) = (&matched.maps, args.sign, Some(Sigma::for_method(&method)));
-    let outcome = Outcome { maps, range, sign, left, rig, rectifying, third, sigma, georeferences };
+    let (maps, sign, sigma) = (&matched.maps, args.sign, Some(Sigma::for_method(method)));
+    let outcome = Outcome { maps, range, sign, left, rig, rectifying, third: *third, sigma, georeferences };
     let mut record = MatchRecord::new(&files, &matched, time, args.sign);
     record.rectified = args.rectify;
     record.region = args.region.roi.as_ref().map(|part| [part.x.start, part.y.start]);
     record.trust = trust;
     let said = write_outputs(args, &also, &outcome, &record)?;
-    if let Some(why) = empty(args, &outcome, is_found).filter(|_| !args.quiet) {
+    say_end(args, &outcome, is_found, unit.as_deref(), &said);
+    Ok(())
+}
+
+/// The paths of the match, for a record.
+fn record_files<V>(args: &Args, input: &Input<V>) -> Files {
+    let prior = args.prior.file().map(|path| path.display().to_string());
+    Files { prior, ..args.pair.files(input, Some(args.output())) }
+}
+
+/// Prints remarks about the outputs: why they are empty, or what was `said` of each, with the unit of depths.
+fn say_end(args: &Args, outcome: &Outcome, is_found: bool, unit: Option<&str>, said: &[String]) {
+    if args.quiet {
+        return;
+    }
+    if let Some(why) = empty(args, outcome, is_found) {
         console::say(&format!("warning: {why}"));
     }
-    if let Some(unit) = unit.filter(|_| !args.quiet && !said.is_empty()) {
+    if let Some(unit) = unit.filter(|_| !said.is_empty()) {
         console::say(&format!("{}; unit: {unit}", said.join("; ")));
     }
-    Ok(())
 }
 
 /// Why depths and points come out empty, or nearly so, and what helps. The range may be one that `is_found` by matches.
@@ -225,7 +366,7 @@ fn empty(args: &Args, outcome: &Outcome, is_found: bool) -> Option<String> {
 }
 
 /// Checks before any computing that all outputs can be written. Returns the files of `--also`.
-fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathBuf)>> {
+fn check_outputs<V>(args: &Args, input: &Input<V>) -> Result<Vec<(&'static Also, PathBuf)>> {
     let output = args.output();
     if files::is_printed(output) {
         if let Some(word) = args.also.wanted().next() {

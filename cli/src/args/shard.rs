@@ -1,15 +1,15 @@
-//! Parts of a list, for several machines or jobs.
+//! Parts of a list or of a pair, for several machines or jobs.
 
 /// Part `index` of `count`, from 0.
 #[derive(Clone, Copy)]
-pub(super) struct Shard {
+pub(crate) struct Shard {
     index: u64,
     count: u64,
 }
 
 /// # Errors
 /// A message with the accepted form, for anything but K/N.
-pub(super) fn shard(text: &str) -> Result<Shard, String> {
+pub(crate) fn shard(text: &str) -> Result<Shard, String> {
     let numbers = text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse::<u32>().ok()?)));
     match numbers {
         Some((k, n)) if (1..=n).contains(&k) => Ok(Shard { index: u64::from(k - 1), count: u64::from(n) }),
@@ -18,8 +18,13 @@ pub(super) fn shard(text: &str) -> Result<Shard, String> {
 }
 
 impl Shard {
+    /// Whether block `index` of a pair, from 0, is in this part.
+    pub(crate) fn holds_block(self, index: usize) -> bool {
+        index as u64 % self.count == self.index
+    }
+
     /// Whether the pair `name` is in this part.
-    pub(super) fn holds(self, name: &str) -> bool {
+    pub(crate) fn holds(self, name: &str) -> bool {
         let hash = name
             .bytes()
             .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3));
@@ -48,6 +53,14 @@ mod tests {
         for (name, hash) in [("a", 0xaf63_dc4c_8601_ec8c_u64), ("foobar", 0x8594_4171_f739_67e8)] {
             let (index, count) = ((hash >> 32 ^ hash & 0xffff_ffff) % 1009, 1009);
             assert!(Shard { index, count }.holds(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn every_block_is_in_one_shard() {
+        for count in [1, 2, 3, 8, 64] {
+            let held = |block: usize| (0..count).filter(|&index| Shard { index, count }.holds_block(block)).count();
+            assert!((0..100).all(|block| held(block) == 1), "{count}");
         }
     }
 

@@ -1,0 +1,8 @@
+//! Large pairs in blocks: a folder with a file for each matched block, from which all outputs are joined.
+
+mod folder;
+mod joined;
+mod stored;
+
+pub(crate) use folder::{BlockFiles, BlockFolder, BlockState, Fingerprint, Known};
+pub(crate) use stored::BlockRecord;
