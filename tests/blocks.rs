@@ -78,7 +78,7 @@ fn blocks_partition_the_view_and_windows_hold_what_they_need() {
         assert_eq!((pixels, last.unwrap().y.end), (size.0 * size.1, size.1), "{case}");
         for sample in blocks.samples() {
             assert!(!sample.x.is_empty() && sample.x.end <= size.0 && sample.y.end <= size.1, "{case}");
-            assert!(sample.y.len() <= 3 * 1024 || blocks.samples().len() == 1, "{case}");
+            assert!(sample.y.len() <= 1025 || blocks.samples().len() == 1, "{case}");
         }
     }
     assert!(cut > 50 && refused > 50, "{cut} {refused}");

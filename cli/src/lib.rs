@@ -229,7 +229,7 @@ mod tests {
     #[test]
     fn commands_have_few_flags() {
         let caps = [
-            ("match", 34),
+            ("match", 36),
             ("rectify", 9),
             ("depth", 17),
             ("sequence", 42),

@@ -18,8 +18,11 @@ const MARGIN: usize = 128;
 const LARGEST: usize = 4096;
 /// Samples in which corrections are measured lie in the middle of the parts of a grid with this many columns and rows.
 const SAMPLES: usize = 3;
-/// Width and height of a sample in pixels. A pair of fewer pixels than all samples is measured as a whole.
+/// Width and height of a sample in pixels.
 const SAMPLE: usize = 1024;
+/// Bytes that measuring takes for each pixel. A pair is measured as a whole if that fits in the memory of the method, or is little.
+const BYTES: u64 = 72;
+const LITTLE: u64 = 1 << 27;
 
 /// A pair in blocks, each matched alone. Their cut depends on the size of the pair, the disparities and the method alone, so it is the
 /// same on every machine.
@@ -29,6 +32,8 @@ pub struct Blocks {
     list: Vec<Region>,
     /// Pixels to the left and to the right of a part of the left view that hold its matches.
     reach: [usize; 2],
+    /// The memory of the method in bytes.
+    memory: u64,
 }
 
 impl Blocks {
@@ -73,7 +78,8 @@ impl Blocks {
                 window: Rect { x: window_x, y: window_y.clone() },
             })
         });
-        Ok(Self { size: (width, height), list: list.collect(), reach })
+        let memory = u64::from(method.tiles.memory) << 20;
+        Ok(Self { size: (width, height), list: list.collect(), reach, memory })
     }
 
     /// (width, height) of the pair.
@@ -90,11 +96,11 @@ impl Blocks {
     }
 
     /// The parts of the pair in which the corrections of all blocks are measured: see [`Conditioning::median`](crate::Conditioning::median).
-    /// They are windows in the middle of the parts of a grid, or the whole of a smaller pair.
+    /// They are windows in the middle of the parts of a grid, or all of the pair if the memory holds it.
     #[must_use]
     pub fn samples(&self) -> Vec<Rect> {
         let (width, height) = self.size;
-        if width * height <= (SAMPLES * SAMPLE).pow(2) {
+        if BYTES * (width * height) as u64 <= self.memory.max(LITTLE) {
             return vec![Rect::whole(self.size)];
         }
         let around = |middle: usize, [before, after]: [usize; 2], length: usize| {

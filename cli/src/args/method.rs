@@ -16,8 +16,8 @@ pub(crate) struct MethodArgs {
     /// Sets one option, after --method: `--set levels=4 --set matching=sad`
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
     pub(crate) set: Vec<(String, String)>,
-    /// Memory limit of a match, such as 2GiB or 512MiB. A pair that needs more is matched tile by tile, which changes the result slightly
-    /// [default: 4GiB, set by the preset]
+    /// Memory limit of a match, such as 2GiB or 512MiB. A pair that needs more is matched in tiles, and a larger one in blocks, which
+    /// changes the result slightly [default: 4GiB, set by the preset]
     #[arg(long, value_name = "SIZE", value_parser = mebibytes)]
     pub(crate) memory: Option<u32>,
 }

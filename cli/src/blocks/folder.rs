@@ -5,6 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use flate2::Crc;
+use mrfgs::error::Reason;
 use mrfgs::image::{Rect, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
@@ -70,7 +71,7 @@ impl Fingerprint {
             let last = bytes.saturating_sub(PLACE);
             let places = if bytes > PLACES * PLACE { PLACES } else { 1 };
             for place in 0..places {
-                file.seek(SeekFrom::Start(last / (places - 1).max(1) * place))?;
+                file.seek(SeekFrom::Start(last * place / (places - 1).max(1)))?;
                 buffer.clear();
                 let most = if places == 1 { u64::MAX } else { PLACE };
                 (&mut file).take(most).read_to_end(&mut buffer)?;
@@ -128,7 +129,8 @@ impl BlockFolder {
                 // Another run may be beginning.
                 let is_ours = |name: &str| name.starts_with('.');
                 if entries.any(|entry| entry.is_ok_and(|entry| !is_ours(&entry.file_name().to_string_lossy()))) {
-                    return Err(Error::write(path, "the folder holds other files; give a new one").into());
+                    let reason = Reason::of_request("the folder holds other files; give a new one");
+                    return Err(Error::write(path, reason).into());
                 }
                 None
             }
@@ -141,7 +143,7 @@ impl BlockFolder {
                     let reason = format!(
                         "the folder holds blocks of another match, whose {key} differs; give another folder, or remove this one"
                     );
-                    return Err(Error::write(path, reason).into());
+                    return Err(Error::write(path, Reason::of_request(reason)).into());
                 }
                 Some(manifest.known)
             }

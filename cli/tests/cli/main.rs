@@ -4,6 +4,7 @@
 
 mod batch;
 mod bench;
+mod blocks;
 mod calibrations;
 mod contradictions;
 mod demo;
