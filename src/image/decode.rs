@@ -189,14 +189,14 @@ fn plain(text: &str) -> String {
     out
 }
 
+/// (width, height) as stored, and the orientation.
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) type Turned = ((usize, usize), Orientation);
+
 /// (width, height) and orientation of a file of `length` bytes, of which `bytes` are the first: of the image as
 /// stored, by its header alone. `None` for a kind whose header is packed or elsewhere.
 #[cfg(not(target_arch = "wasm32"))]
-pub(super) fn size(
-    bytes: &[u8],
-    max_pixels: u64,
-    length: u64,
-) -> Result<Option<((usize, usize), Orientation)>, ReadError> {
+pub(super) fn size(bytes: &[u8], max_pixels: u64, length: u64) -> Result<Option<Turned>, ReadError> {
     let upright = |size| Some((size, Orientation::UPRIGHT));
     guarded(|| match Kind::detect(bytes) {
         Some(Kind::Pfm) => Ok(upright(pfm::size(bytes, max_pixels)?.0)),

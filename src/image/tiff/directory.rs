@@ -22,6 +22,9 @@ struct Entry {
     place: u64,
 }
 
+/// The type of the values of a tag, and their bytes.
+type Values<'a> = (u16, Cow<'a, [u8]>);
+
 /// The tags of one image in a file.
 pub(super) struct Directory<'a> {
     file: Bytes<'a>,
@@ -101,7 +104,7 @@ impl<'a> Directory<'a> {
     }
 
     /// The values of a tag as stored, with their type.
-    pub(super) fn values(&self, tag: Tag) -> Result<Option<(u16, Cow<'a, [u8]>)>, ReadError> {
+    pub(super) fn values(&self, tag: Tag) -> Result<Option<Values<'a>>, ReadError> {
         let Some(entry) = self.entries.iter().find(|entry| entry.tag == tag.to_u16()) else {
             return Ok(None);
         };

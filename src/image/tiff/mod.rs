@@ -4,16 +4,19 @@
 //! meaning of the samples is either supported or rejected. Resolution, colour profiles and
 //! response curves are ignored, as everywhere in [`Reader::pair`](super::read::Reader::pair).
 
+mod cache;
 mod chunks;
 mod colours;
 mod directory;
 mod encode;
 mod geo;
 
+pub(super) use cache::Cache;
 pub(super) use encode::{MAX_PLAIN, encode, write_bands};
 
 use std::borrow::Cow;
-use std::ops::Range;
+use std::ops::{Deref, Range};
+use std::sync::Arc;
 
 use half::f16;
 use tiff::tags::{ByteOrder, Tag};
@@ -70,7 +73,7 @@ pub(super) fn decode(
 ) -> Result<Raster<'static>, ReadError> {
     let file = Bytes::Held(file);
     let image = Stored::find(file, max_pixels, no_data)?;
-    let whole = image.part(file, &Rect::whole(image.size()))?;
+    let whole = image.part(file, &Rect::whole(image.size()), None)?;
     Ok(Raster { georeference: image.georeference, orientation: image.orientation, ..whole })
 }
 
@@ -104,12 +107,17 @@ impl Stored {
         (self.layout.width, self.layout.height)
     }
 
-    /// The pixels in `part`, without georeference and orientation.
+    /// The pixels in `part`, without georeference and orientation. Strips and tiles come from the `cache` where it holds them.
     ///
     /// # Errors
     /// A description of the damage, in one line.
-    pub(super) fn part(&self, file: Bytes, part: &Rect) -> Result<Raster<'static>, ReadError> {
-        let samples = self.layout.samples(file, part, self.no_data.unwrap_or(0.0))?;
+    pub(super) fn part(
+        &self,
+        file: Bytes,
+        part: &Rect,
+        cache: Option<&Cache>,
+    ) -> Result<Raster<'static>, ReadError> {
+        let samples = self.layout.samples((file, cache), part, self.no_data.unwrap_or(0.0))?;
         let holding = |value| holding(&samples, self.layout.read, self.colours.stored(), value);
         let no_data = self.no_data.map(holding).transpose()?;
         let (channels, samples) = self.colours.levels(samples)?;
@@ -169,6 +177,35 @@ fn no_data_of(directory: &Directory) -> Result<Option<f64>, ReadError> {
         // Some programs write an empty tag.
         Err(_) if text.is_empty() => Ok(None),
         Err(_) => Err(ReadError::NoData { value: quoted(&text) }),
+    }
+}
+
+/// A file, and its strips and tiles that are unpacked already.
+type Origin<'a> = (Bytes<'a>, Option<&'a Cache>);
+
+/// Rows of a strip or tile, as stored and unpacked.
+struct Rows<'a> {
+    bytes: Held<'a>,
+    row_bytes: usize,
+    /// The first column and row within the strip or tile.
+    left: usize,
+    top: usize,
+}
+
+/// Bytes of rows.
+enum Held<'a> {
+    Read(Cow<'a, [u8]>),
+    Cached(Arc<Vec<u8>>),
+}
+
+impl Deref for Held<'_> {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Read(bytes) => bytes,
+            Self::Cached(bytes) => bytes,
+        }
     }
 }
 
@@ -312,7 +349,7 @@ impl Layout {
     }
 
     /// The samples of `part` that are read; `missing` fills strips or tiles that the file omits.
-    fn samples(&self, file: Bytes, part: &Rect, missing: f64) -> Result<Samples<'static>, ReadError> {
+    fn samples(&self, file: Origin, part: &Rect, missing: f64) -> Result<Samples<'static>, ReadError> {
         let (order, bits) = (self.packing.order, self.packing.bits);
         let size = bits as usize / 8;
         let number = |row: &[u8], i: usize| directory::number(order, &row[i * size..(i + 1) * size]);
@@ -356,7 +393,7 @@ impl Layout {
     /// Assembles `part` from strips or tiles; `read` extracts sample `i` of a row.
     fn assembled<S: Sample>(
         &self,
-        file: Bytes,
+        file: Origin,
         part: &Rect,
         missing: S,
         read: impl Fn(&[u8], usize) -> S,
@@ -369,17 +406,18 @@ impl Layout {
             for (v, u) in covered(&part.y, self.chunk.1)
                 .flat_map(|v| covered(&part.x, self.chunk.0).map(move |u| (v, u)))
             {
-                let Some(place) = self.place((plane * down + v) * across + u, file.len())? else { continue };
+                let i = (plane * down + v) * across + u;
+                let Some(place) = self.place(i, file.0.len())? else { continue };
                 let (left, top) = (u * self.chunk.0, v * self.chunk.1);
                 let columns = left.max(part.x.start)..(left + self.chunk.0).min(part.x.end);
                 let rows = top.max(part.y.start)..(top + self.chunk.1).min(part.y.end);
-                let (first, stored) = self.rows(file, place, v, &rows)?;
-                let row_bytes =
-                    if self.subsampling.is_some() { 3 * self.chunk.0 } else { self.packing.row_bytes };
-                let lines = (first..rows.end).zip(stored.chunks_exact(row_bytes));
-                for (y, row) in lines.skip(rows.start - first) {
+                let inside =
+                    Rect { x: columns.start - left..columns.end - left, y: rows.start - top..rows.end - top };
+                let stored = self.stored(file, (i, place), &inside)?;
+                let lines = stored.bytes.chunks_exact(stored.row_bytes).skip(inside.y.start - stored.top);
+                for (y, row) in rows.zip(lines) {
                     let pixel = (y - part.y.start) * part.x.len() + columns.start - part.x.start;
-                    let (start, from) = (pixel * self.read + plane, columns.start - left);
+                    let (start, from) = (pixel * self.read + plane, inside.x.start - stored.left);
                     for x in 0..columns.len() {
                         for c in 0..in_row {
                             out[start + x * self.read + c] = read(row, (from + x) * samples + c);
@@ -391,40 +429,57 @@ impl Layout {
         Ok(S::samples(out.into()))
     }
 
-    /// The stored rows of a strip or tile of row `v` of them that cover the image's `rows`, with spread chroma, and the image row of the first one.
-    fn rows<'a>(
+    /// The rows of strip or tile `i` at `place`, those in `inside` of it at least, with spread chroma.
+    fn stored<'a>(
         &self,
-        file: Bytes<'a>,
-        place: Range<u64>,
-        v: usize,
-        rows: &Range<usize>,
-    ) -> Result<(usize, Cow<'a, [u8]>), ReadError> {
-        let top = v * self.chunk.1;
+        (file, cache): Origin<'a>,
+        (i, place): (usize, Range<u64>),
+        inside: &Rect,
+    ) -> Result<Rows<'a>, ReadError> {
         let down = self.subsampling.map_or(1, |(_, down)| down);
-        // Rows that are not packed are read alone.
-        let (first, count) = if self.is_packed() {
-            (0, self.stored_rows(v))
-        } else {
-            let first = (rows.start - top) / down;
-            (first, (rows.end - top).div_ceil(down) - first)
+        let get = |start, length| {
+            let data = file.get(start, length)?;
+            data.ok_or_else(|| damaged("the TIFF pixels end behind the end of the file"))
         };
-        let row_bytes = self.packing.row_bytes as u64;
-        let (start, length) = if self.is_packed() {
-            (place.start, place.end - place.start)
+        let row_bytes = self.packing.row_bytes;
+        let mut rows = Rows { bytes: Held::Read(Cow::Borrowed(&[])), row_bytes, left: 0, top: 0 };
+        rows.bytes = if self.is_packed() {
+            let unpack = || {
+                let data = get(place.start, place.end - place.start)?;
+                self.packing.rows(data, self.stored_rows(i / self.counts().0 % self.counts().1))
+            };
+            match cache {
+                Some(cache) => Held::Cached(cache.get(i, || unpack().map(Cow::into_owned))?),
+                None => Held::Read(unpack()?),
+            }
         } else {
-            (place.start + first as u64 * row_bytes, count as u64 * row_bytes)
+            // Rows that are not packed are read alone, and so are a few of their columns.
+            let first = inside.y.start / down;
+            let count = inside.y.end.div_ceil(down) - first;
+            let start = place.start + first as u64 * row_bytes as u64;
+            rows.top = first * down;
+            let columns = inside.x.start / 8 * 8..inside.x.end;
+            let bits = self.packing.samples * self.packing.bits as usize;
+            let (skipped, needed) = (columns.start / 8 * bits, (columns.len() * bits).div_ceil(8));
+            if self.subsampling.is_some() || needed > row_bytes / 2 {
+                let data = get(start, count as u64 * row_bytes as u64)?;
+                Held::Read(self.packing.rows(data, count)?)
+            } else {
+                let mut data = memory::reserved(count * needed)?;
+                for y in 0..count as u64 {
+                    let start = start + y * row_bytes as u64 + skipped as u64;
+                    data.extend_from_slice(&get(start, needed as u64)?);
+                }
+                (rows.row_bytes, rows.left) = (needed, columns.start);
+                Held::Read(self.packing.rows(Cow::Owned(data), count)?)
+            }
         };
-        let data = file.get(start, length)?;
-        let data = data.ok_or_else(|| damaged("the TIFF pixels end behind the end of the file"))?;
-        let stored = self.packing.rows(data, count)?;
-        let top = top + first * down;
-        Ok((
-            top,
-            match self.subsampling {
-                Some(sub) => Cow::Owned(colours::spread(&stored, self.chunk.0, rows.end - top, sub)?),
-                None => stored,
-            },
-        ))
+        if let Some(sub) = self.subsampling {
+            let spread = colours::spread(&rows.bytes, self.chunk.0, inside.y.end - rows.top, sub)?;
+            rows.bytes = Held::Read(Cow::Owned(spread));
+            rows.row_bytes = 3 * self.chunk.0;
+        }
+        Ok(rows)
     }
 
     /// Whether rows are compressed.

@@ -56,8 +56,12 @@ impl Folder {
     }
 }
 
+/// A tag, the type of its values, the bytes of each, and the values.
+type Tag = (u16, (u16, usize, Vec<usize>));
+
 /// A TIFF file whose samples are random.
 #[derive(Clone, Copy, Debug)]
+#[allow(clippy::struct_excessive_bools, reason = "tags of files")]
 struct Sketch {
     size: (usize, usize),
     samples: usize,
@@ -229,7 +233,9 @@ impl Sketch {
             _ => out = bytes,
         }
         if self.reversed {
-            out.iter_mut().for_each(|byte| *byte = byte.reverse_bits());
+            for byte in &mut out {
+                *byte = byte.reverse_bits();
+            }
         }
         out
     }
@@ -301,7 +307,7 @@ impl Sketch {
         [&[directory], &chunks[..]].concat().concat()
     }
 
-    fn directory(&self, tags: &[(u16, (u16, usize, Vec<usize>))]) -> Vec<u8> {
+    fn directory(&self, tags: &[Tag]) -> Vec<u8> {
         let number = |value: usize, bytes: usize| {
             let mut all = (value as u64).to_le_bytes()[..bytes].to_vec();
             if self.highest_first {
@@ -339,12 +345,13 @@ impl Sketch {
     }
 }
 
-/// Compares windows of a pair with parts of the whole one, with everything in memory and with all of it in scratch files.
+/// Compares windows of a pair with parts of the whole one, with all of it in scratch files, with a part in memory, and with
+/// everything in memory.
 fn compare(r: &mut Random, reader: Reader, [left, right]: [&Path; 2], mask: Option<&Path>, what: &str) {
     let scratch = tempfile::tempdir().unwrap();
     let pair = reader.pair(left, right, mask).unwrap_or_else(|e| panic!("{what}: {e}"));
     assert_eq!(reader.size(left).unwrap(), pair.size(), "{what}");
-    for kept in [0, KEPT] {
+    for kept in [0, 900, KEPT] {
         let windows = reader.windows_keeping(kept, [left, right], mask, scratch.path());
         let windows = windows.unwrap_or_else(|e| panic!("{what}: {e}"));
         assert_eq!(windows.size(), pair.size(), "{what}");
@@ -382,7 +389,7 @@ fn windows_of_tiff_files_are_parts_of_the_pair() {
         let files = [f.bytes("l.tif", &l), f.bytes("r.tif", &m)];
         let orient = r.below(2) == 0;
         let no_data = r.one_of(&[None, None, Some(5.0)]);
-        let reader = Reader { orient, no_data, ..Reader::default() };
+        let reader = Reader { no_data, orient, ..Reader::default() };
         let sideways = orient && left.orientation > 4;
         let mask = (r.below(3) == 0).then(|| {
             let size = if sideways { (size.1, size.0) } else { size };
@@ -505,7 +512,7 @@ fn windows_of_other_files_are_parts_of_the_pair() {
         for (orient, no_data, mask) in
             [(false, None, None), (false, Some(31.0), Some(&*mask)), (true, None, None)]
         {
-            let reader = Reader { orient, no_data, ..Reader::default() };
+            let reader = Reader { no_data, orient, ..Reader::default() };
             let what = format!("{}, {reader:?}", left.display());
             compare(&mut r, reader, [left, right], mask, &what);
         }
@@ -619,7 +626,7 @@ fn pieces_keep_strips_and_tiles_whole() {
             }
             if sketch.compression != NONE {
                 let aligned = |range: &std::ops::Range<usize>, side: usize, end: usize| {
-                    range.start % side == 0 && (range.end % side == 0 || range.end == end)
+                    range.start.is_multiple_of(side) && (range.end.is_multiple_of(side) || range.end == end)
                 };
                 assert!(
                     aligned(&piece.x, sketch.chunk.0, size.0) && aligned(&piece.y, sketch.chunk.1, size.1)

@@ -39,7 +39,7 @@ pub(super) struct View {
 
 /// Where the samples are, in the stored orientation.
 enum Source {
-    Tiff(Disk, Box<tiff::Stored>),
+    Tiff(Disk, Box<tiff::Stored>, tiff::Cache),
     Held(Raster<'static>),
     Spilled(Spill),
 }
@@ -58,7 +58,7 @@ impl View {
             let tag = image.orientation;
             let georeference = image.georeference.clone();
             let source = if bytes <= kept {
-                Source::Tiff(file, image.into())
+                Source::Tiff(file, image.into(), tiff::Cache::new(kept as usize))
             } else {
                 // What is stored, what is unpacked, and its samples.
                 let _claim = Claim::new(3 * bytes).map_err(|e| error(e.into()))?;
@@ -90,7 +90,7 @@ impl View {
     ) -> Result<Self> {
         let turn = if reader.orient { tag } else { Orientation::UPRIGHT };
         let (stored, is_float, holds_bytes) = match &source {
-            Source::Tiff(_, image) => {
+            Source::Tiff(_, image, _) => {
                 // Only samples themselves say for certain what type they become.
                 let pixel = source.part(path, &Rect::whole((1, 1)))?;
                 (image.size(), pixel.samples.is_float(), matches!(pixel.samples, Samples::Byte(_)))
@@ -159,7 +159,7 @@ impl View {
         }
         let stored = self.turn.turned(self.size);
         let pieces = match &self.source {
-            Source::Tiff(_, image) => image.pieces(PIECE),
+            Source::Tiff(_, image, _) => image.pieces(PIECE),
             Source::Held(_) | Source::Spilled(_) => {
                 let rows = (PIECE / stored.0).max(1);
                 let tops = (0..stored.1).step_by(rows);
@@ -175,9 +175,8 @@ impl Source {
     /// The samples of `part` of the stored image in the file `path`.
     fn part(&self, path: &Path, part: &Rect) -> Result<Raster<'static>> {
         match self {
-            Self::Tiff(file, image) => {
-                guarded(|| image.part(Bytes::OnDisk(file), part)).map_err(|cause| Error::read(path, cause))
-            }
+            Self::Tiff(file, image, cache) => guarded(|| image.part(Bytes::OnDisk(file), part, Some(cache)))
+                .map_err(|cause| Error::read(path, cause)),
             Self::Held(raster) => raster.crop(part),
             Self::Spilled(spill) => spill.part(part),
         }
@@ -200,7 +199,7 @@ fn tiff_on_disk(reader: Reader, path: &Path) -> Result<Option<(Disk, tiff::Store
 fn unpacked(path: &Path, file: &Disk, image: &tiff::Stored, scratch: &Path) -> Result<Spill> {
     let mut spill = None;
     for piece in image.pieces(PIECE) {
-        let raster = guarded(|| image.part(Bytes::OnDisk(file), &piece));
+        let raster = guarded(|| image.part(Bytes::OnDisk(file), &piece, None));
         let raster = raster.map_err(|cause| Error::read(path, cause))?;
         let spill = match &mut spill {
             Some(spill) => spill,
