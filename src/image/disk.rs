@@ -1,7 +1,7 @@
 //! Files on the disk that are read and written at any place, by several threads at once.
 
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Seek};
 use std::path::Path;
 
 use crate::error::{Purpose, ReadError};
@@ -30,6 +30,16 @@ impl Disk {
         let file = File::open(path)?;
         let length = file.metadata()?.len();
         Ok(Some(Self { file, length }))
+    }
+
+    /// The file itself, to be read from its start.
+    ///
+    /// # Errors
+    /// That of the system.
+    pub(super) fn into_file(mut self) -> io::Result<File> {
+        // On some systems, reading at a place moves the position too.
+        self.file.rewind()?;
+        Ok(self.file)
     }
 
     /// A file that is to be written.

@@ -1,6 +1,7 @@
 //! Reads pairs by windows, in the memory of a window.
 
 mod overview;
+mod png_rows;
 mod spill;
 mod view;
 
@@ -23,10 +24,11 @@ const KEPT: u64 = 1 << 26;
 impl Reader {
     /// Opens a rectified pair like [`Reader::pair`], to be read by windows: for images that are larger than the memory.
     ///
-    /// Strips and tiles of TIFF files are read from the file, those alone that a window needs. All other files are
-    /// decoded whole, one after the other, and so are TIFF files with very large packed strips, strip by strip. If that is
-    /// more than 64 MiB, the samples go into a file without a name in the folder `scratch`, which vanishes with the
-    /// windows. Images of more than 8 bits are read once from end to end, since their levels depend on all values of the
+    /// Strips and tiles of TIFF files are read from the file, those alone that a window needs; up to 64 MiB of unpacked ones
+    /// of each image are kept, since neighbouring windows share them. Files of other kinds are unpacked, one after the
+    /// other, and TIFF files whose strips or tiles are larger than that. Samples of more than 64 MiB go into a file
+    /// without a name in the folder `scratch`, which vanishes with the pair. PNG files are unpacked row by row and TIFF files
+    /// strip by strip; interlaced PNG files and those of other kinds must fit in memory. Images of more than 8 bits are read once from end to end, since their levels depend on all values of the
     /// pair. The files must stay as they are while windows are read.
     ///
     /// # Errors

@@ -1,5 +1,5 @@
 use std::fs;
-use std::io::Cursor;
+use std::io::{Cursor, Write};
 use std::path::PathBuf;
 
 use image::{GrayImage, ImageFormat, Luma};
@@ -515,6 +515,102 @@ fn windows_of_other_files_are_parts_of_the_pair() {
             let reader = Reader { no_data, orient, ..Reader::default() };
             let what = format!("{}, {reader:?}", left.display());
             compare(&mut r, reader, [left, right], mask, &what);
+        }
+    }
+}
+
+/// A PNG file with samples of any number of bits, and all of its chunks.
+fn png(r: &mut Random, (width, height): (u32, u32), colour: png::ColorType, depth: png::BitDepth) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(colour);
+    encoder.set_depth(depth);
+    if colour == png::ColorType::Indexed {
+        encoder.set_palette(r.bytes(3 * 256));
+        encoder.set_trns(vec![9, 0, 255, 0]);
+    } else if colour == png::ColorType::Grayscale {
+        encoder.set_trns(vec![0, 1]);
+    }
+    let row = (width as usize * colour.samples() * depth as usize).div_ceil(8);
+    let data = r.bytes(row * height as usize);
+    encoder.write_header().unwrap().write_image_data(&data).unwrap();
+    bytes
+}
+
+/// A grey PNG file of 8 bits with interlaced rows.
+fn interlaced(r: &mut Random, (width, height): (usize, usize)) -> Vec<u8> {
+    let mut rows = Vec::new();
+    for (x, y, dx, dy) in
+        [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
+    {
+        let columns = (x..width).step_by(dx).count();
+        for _ in (y..height).step_by(dy).filter(|_| columns > 0) {
+            rows.push(0);
+            rows.extend(r.bytes(columns));
+        }
+    }
+    let mut packed = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    packed.write_all(&rows).unwrap();
+    let size = [width, height].map(|n| (n as u32).to_be_bytes()).concat();
+    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+    for (name, body) in [
+        (b"IHDR", [&size[..], &[8, 0, 0, 0, 1]].concat()),
+        (b"IDAT", packed.finish().unwrap()),
+        (b"IEND", Vec::new()),
+    ] {
+        let chunk = [&name[..], &body].concat();
+        let mut crc = flate2::Crc::new();
+        crc.update(&chunk);
+        file.extend([&(body.len() as u32).to_be_bytes()[..], &chunk, &crc.sum().to_be_bytes()].concat());
+    }
+    file
+}
+
+#[test]
+fn windows_of_png_files_are_parts_of_the_pair() {
+    use png::BitDepth::{Eight, Four, One, Sixteen, Two};
+    use png::ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
+    let (f, mut r) = (Folder::new(), Random(19));
+    let size = (41, 29);
+    for (colour, depth) in [
+        (Grayscale, One),
+        (Grayscale, Two),
+        (Grayscale, Four),
+        (Grayscale, Eight),
+        (Grayscale, Sixteen),
+        (GrayscaleAlpha, Eight),
+        (GrayscaleAlpha, Sixteen),
+        (Indexed, One),
+        (Indexed, Four),
+        (Indexed, Eight),
+        (Rgb, Eight),
+        (Rgb, Sixteen),
+        (Rgba, Eight),
+        (Rgba, Sixteen),
+    ] {
+        let files = ["l.png", "r.png"].map(|name| f.bytes(name, &png(&mut r, size, colour, depth)));
+        for no_data in [None, Some(85.0)] {
+            let reader = Reader { no_data, ..Reader::default() };
+            compare(&mut r, reader, [&files[0], &files[1]], None, &format!("{colour:?}, {depth:?}"));
+        }
+    }
+    let files = ["l.png", "r.png"].map(|name| f.bytes(name, &interlaced(&mut r, (41, 29))));
+    compare(&mut r, Reader::default(), [&files[0], &files[1]], None, "interlaced");
+    // A damaged file has the error of the general decoder.
+    let sound = png(&mut r, (41, 29), Rgb, Eight);
+    for at in (1..sound.len()).step_by(31) {
+        let mut flipped = sound.clone();
+        flipped[at] ^= 0x10;
+        for bytes in [&sound[..at], &flipped] {
+            let path = f.bytes("damaged.png", bytes);
+            let opened = Reader::default().windows_keeping(0, [&path, &path], None, f.path());
+            match Reader::default().pair(&path, &path, None) {
+                Ok(pair) => {
+                    let whole = Rect::whole(pair.size());
+                    assert_eq!(opened.unwrap().window(&whole).unwrap(), pair.crop(&whole));
+                }
+                Err(error) => assert_eq!(opened.unwrap_err(), error),
+            }
         }
     }
 }

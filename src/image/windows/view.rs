@@ -2,6 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use image::ImageFormat;
+
+use super::png_rows::Png;
 use super::spill::Spill;
 use crate::error::{Error, ReadError, Result};
 use crate::image::bytes::Bytes;
@@ -65,6 +68,9 @@ impl View {
                 Source::Spilled(unpacked(path, &file, &image, scratch)?)
             };
             return Self::of(reader, path, source, tag, georeference, None);
+        }
+        if let Some((spill, tag)) = unpacked_png(reader, path, scratch, kept)? {
+            return Self::of(reader, path, Source::Spilled(spill), tag, None, None);
         }
         let stored = Reader { orient: false, ..reader }.raster(path)?;
         let (tag, georeference, doubt) =
@@ -160,11 +166,7 @@ impl View {
         let stored = self.turn.turned(self.size);
         let pieces = match &self.source {
             Source::Tiff(_, image, _) => image.pieces(PIECE),
-            Source::Held(_) | Source::Spilled(_) => {
-                let rows = (PIECE / stored.0).max(1);
-                let tops = (0..stored.1).step_by(rows);
-                tops.map(|y| Rect { x: 0..stored.0, y: y..(y + rows).min(stored.1) }).collect()
-            }
+            Source::Held(_) | Source::Spilled(_) => bands(stored).collect(),
         };
         let back = self.turn.inverse();
         pieces.iter().map(|piece| back.stored_part(piece, stored)).collect()
@@ -183,13 +185,16 @@ impl Source {
     }
 }
 
-/// The image of a TIFF file on the disk, with the file. `None` for all other files, also those that are refused for another reason.
+/// A file of this kind on the disk. `None` for all others, also those that are refused for another reason.
+fn on_disk(reader: Reader, path: &Path, kind: Kind) -> Option<Disk> {
+    let file = Disk::open(path).ok()??;
+    let first = file.read(0, file.len().min(64)).ok()?;
+    (Kind::detect(&first) == Some(kind) && file.len() <= max_bytes_of(reader.max_pixels)).then_some(file)
+}
+
+/// The image of a TIFF file on the disk, with the file; `None` like [`on_disk`].
 fn tiff_on_disk(reader: Reader, path: &Path) -> Result<Option<(Disk, tiff::Stored)>> {
-    let Ok(Some(file)) = Disk::open(path) else { return Ok(None) };
-    let first = file.read(0, file.len().min(64)).unwrap_or_default();
-    if Kind::detect(&first) != Some(Kind::Tiff) || file.len() > max_bytes_of(reader.max_pixels) {
-        return Ok(None);
-    }
+    let Some(file) = on_disk(reader, path, Kind::Tiff) else { return Ok(None) };
     let image = guarded(|| tiff::Stored::find(Bytes::OnDisk(&file), reader.max_pixels, reader.no_data));
     let image = image.map_err(|cause| Error::read(path, cause))?;
     Ok(Some((file, image)))
@@ -208,6 +213,45 @@ fn unpacked(path: &Path, file: &Disk, image: &tiff::Stored, scratch: &Path) -> R
         spill.write(&raster, &piece)?;
     }
     Ok(spill.expect("an image has a pixel"))
+}
+
+/// The samples of a PNG file in a scratch file, with its orientation. `None` for other files, and where the general
+/// decoder has to read the file or to say what is wrong with it.
+///
+/// # Errors
+/// [`Error::Write`] when `scratch` cannot be written.
+fn unpacked_png(
+    reader: Reader,
+    path: &Path,
+    scratch: &Path,
+    kept: u64,
+) -> Result<Option<(Spill, Orientation)>> {
+    let file = on_disk(reader, path, Kind::Coded(ImageFormat::Png));
+    let Some(mut png) = file.and_then(|file| Png::open(file, reader.max_pixels)) else { return Ok(None) };
+    let (size, orientation) = (png.size, png.orientation);
+    if (png.row_bytes() * size.1) as u64 <= kept {
+        return Ok(None);
+    }
+    let mut spill: Option<Spill> = None;
+    for piece in bands(size) {
+        let rows = png.rows(piece.y.len()).map(|rows| match reader.no_data {
+            Some(value) => rows.marked(value).ok(),
+            None => Some(rows),
+        });
+        let Some(rows) = rows.flatten() else { return Ok(None) };
+        let spill = match &mut spill {
+            Some(spill) => spill,
+            none => none.insert(Spill::new(scratch, size, &rows)?),
+        };
+        spill.write(&rows, &piece)?;
+    }
+    Ok(spill.filter(|_| png.is_whole()).map(|spill| (spill, orientation)))
+}
+
+/// Bands of rows of about [`PIECE`] pixels that cover an image.
+fn bands((width, height): (usize, usize)) -> impl Iterator<Item = Rect> {
+    let rows = (PIECE / width).max(1);
+    (0..height).step_by(rows).map(move |y| Rect { x: 0..width, y: y..(y + rows).min(height) })
 }
 
 /// (width, height) by the header of a file.
