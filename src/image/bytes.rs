@@ -30,6 +30,7 @@ impl<'a> Bytes<'a> {
     ///
     /// # Errors
     /// That of the disk, or about memory.
+    #[cfg_attr(target_arch = "wasm32", allow(clippy::unnecessary_wraps, reason = "memory is always read"))]
     pub(super) fn get(self, start: u64, count: u64) -> Result<Option<Cow<'a, [u8]>>, ReadError> {
         let Some(end) = start.checked_add(count).filter(|end| *end <= self.len()) else { return Ok(None) };
         Ok(Some(match self {

@@ -2,6 +2,7 @@
 
 use image::metadata;
 
+#[cfg(not(target_arch = "wasm32"))]
 use super::Rect;
 use super::orientation::Orientation;
 use super::raster::{Raster, Sample, Samples, of_any};
@@ -35,6 +36,15 @@ impl Orientation {
         }
     }
 
+    /// The size of the upright image, from that of the stored one, or the other way.
+    pub(super) fn turned(self, (width, height): (usize, usize)) -> (usize, usize) {
+        if self.is_sideways() { (height, width) } else { (width, height) }
+    }
+}
+
+/// For parts of images in files.
+#[cfg(not(target_arch = "wasm32"))]
+impl Orientation {
     /// The orientation of the stored image that the upright one has, taken as stored.
     pub(super) fn inverse(self) -> Self {
         match self.0 {
@@ -42,11 +52,6 @@ impl Orientation {
             8 => Self(6),
             _ => self,
         }
-    }
-
-    /// The size of the upright image, from that of the stored one, or the other way.
-    pub(super) fn turned(self, (width, height): (usize, usize)) -> (usize, usize) {
-        if self.is_sideways() { (height, width) } else { (width, height) }
     }
 
     /// The stored place of `part`, which is not empty, of an upright image of `size`.

@@ -18,6 +18,7 @@ struct Held {
 
 impl Cache {
     /// Holds `most` bytes.
+    #[cfg(not(target_arch = "wasm32"))]
     pub(in crate::image) fn new(most: usize) -> Self {
         Self { most, held: Mutex::default() }
     }

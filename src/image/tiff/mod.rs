@@ -138,14 +138,15 @@ impl Stored {
         (0..count).try_for_each(|i| self.layout.place(i, file.len()).map(|_| ()))
     }
 
-    /// Bytes that are unpacked for a single pixel: those of a strip or tile, or none where rows are not packed.
+    /// Bytes that are unpacked for a single pixel: those of a strip or tile of each plane, or none where rows are not packed.
     /// `None` where the file does not say where each strip or tile ends.
     pub(super) fn unpacked_bytes(&self) -> Option<u64> {
         let layout = &self.layout;
         if !layout.is_packed() {
             return Some(0);
         }
-        layout.byte_counts.as_ref().map(|_| layout.packing.row_bytes as u64 * layout.stored_rows(0) as u64)
+        let rows = layout.stored_rows(0) * layout.planes_read();
+        layout.byte_counts.as_ref().map(|_| layout.packing.row_bytes as u64 * rows as u64)
     }
 
     /// Parts that cover the image, each of about `pixels` pixels, and that together unpack each strip or tile once.

@@ -29,7 +29,6 @@ impl Png {
 
     fn opened(file: Disk, max_pixels: u64) -> Option<Self> {
         let length = file.len();
-        // The pixels, of which there may be fewer, limit everything else.
         let limits = Limits { bytes: usize::try_from(max_bytes_of(max_pixels)).unwrap_or(usize::MAX) };
         let mut decoder = Decoder::new_with_limits(BufReader::new(file.into_file().ok()?), limits);
         decoder.set_ignore_text_chunk(false);
@@ -81,7 +80,7 @@ impl Png {
     }
 
     /// Whether the file ends soundly after its rows.
-    pub(super) fn is_whole(mut self) -> bool {
+    pub(super) fn ends_soundly(mut self) -> bool {
         guarded(|| Ok(matches!(self.reader.read_row(&mut []), Ok(None)))).unwrap_or(false)
     }
 }

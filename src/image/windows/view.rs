@@ -63,9 +63,9 @@ impl View {
             let source = if bytes <= kept {
                 Source::Tiff(file, image.into(), tiff::Cache::new(kept as usize))
             } else {
-                // What is stored, what is unpacked, and its samples.
+                // Stored, as the decoder gets it, and unpacked.
                 let _claim = Claim::new(3 * bytes).map_err(|e| error(e.into()))?;
-                Source::Spilled(unpacked(path, &file, &image, scratch)?)
+                Source::Spilled(unpacked(path, &file, &image, bytes, scratch)?)
             };
             return Self::of(reader, path, source, tag, georeference, None);
         }
@@ -200,17 +200,23 @@ fn tiff_on_disk(reader: Reader, path: &Path) -> Result<Option<(Disk, tiff::Store
     Ok(Some((file, image)))
 }
 
-/// The samples of a TIFF file in a scratch file, unpacked piece by piece.
-fn unpacked(path: &Path, file: &Disk, image: &tiff::Stored, scratch: &Path) -> Result<Spill> {
+/// The samples of a TIFF file in a scratch file, unpacked strip by strip or tile by tile, of `bytes` bytes each.
+fn unpacked(path: &Path, file: &Disk, image: &tiff::Stored, bytes: u64, scratch: &Path) -> Result<Spill> {
     let mut spill = None;
     for piece in image.pieces(PIECE) {
-        let raster = guarded(|| image.part(Bytes::OnDisk(file), &piece, None));
-        let raster = raster.map_err(|cause| Error::read(path, cause))?;
-        let spill = match &mut spill {
-            Some(spill) => spill,
-            none => none.insert(Spill::new(scratch, image.size(), &raster)?),
-        };
-        spill.write(&raster, &piece)?;
+        // Its bands unpack it once.
+        let cache = tiff::Cache::new(usize::try_from(bytes).unwrap_or(usize::MAX));
+        for band in bands(piece.size()) {
+            let y = piece.y.start + band.y.start..piece.y.start + band.y.end;
+            let band = Rect { x: piece.x.clone(), y };
+            let raster = guarded(|| image.part(Bytes::OnDisk(file), &band, Some(&cache)));
+            let raster = raster.map_err(|cause| Error::read(path, cause))?;
+            let spill = match &mut spill {
+                Some(spill) => spill,
+                none => none.insert(Spill::new(scratch, image.size(), &raster)?),
+            };
+            spill.write(&raster, &band)?;
+        }
     }
     Ok(spill.expect("an image has a pixel"))
 }
@@ -245,7 +251,7 @@ fn unpacked_png(
         };
         spill.write(&rows, &piece)?;
     }
-    Ok(spill.filter(|_| png.is_whole()).map(|spill| (spill, orientation)))
+    Ok(spill.filter(|_| png.ends_soundly()).map(|spill| (spill, orientation)))
 }
 
 /// Bands of rows of about [`PIECE`] pixels that cover an image.
