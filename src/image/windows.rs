@@ -26,10 +26,11 @@ impl Reader {
     ///
     /// Strips and tiles of TIFF files are read from the file, those alone that a window needs; up to 64 MiB of unpacked ones
     /// of each image are kept, since neighbouring windows share them. Files of other kinds are unpacked, one after the
-    /// other, and TIFF files whose strips or tiles are larger than that. Samples of more than 64 MiB go into a file
-    /// without a name in the folder `scratch`, which vanishes with the pair. PNG files are unpacked row by row and TIFF files
-    /// strip by strip; interlaced PNG files and those of other kinds must fit in memory. Images of more than 8 bits are read once from end to end, since their levels depend on all values of the
-    /// pair. The files must stay as they are while windows are read.
+    /// other, and so are TIFF files whose strips or tiles are larger than that. Samples of more than 64 MiB go into a file
+    /// without a name in the folder `scratch`, which vanishes with the pair. PNG files are unpacked row by row and TIFF
+    /// files strip by strip; interlaced PNG files and those of other kinds must fit in memory. Images of more than 8 bits
+    /// are read once from end to end, since their levels depend on all values of the pair. The files must stay as they are
+    /// while windows are read.
     ///
     /// # Errors
     /// The errors of [`Reader::pair`], except that a damaged strip or tile may show up in [`PairWindows::window`] only;

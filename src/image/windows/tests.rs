@@ -434,6 +434,34 @@ fn levels_are_those_of_the_whole_pair() {
     compare(&mut r, Reader::default(), [&byte, &bright], Some(&mask), "8 bits and 16");
 }
 
+/// Several threads may read windows of one pair.
+#[test]
+fn threads_share_a_pair() {
+    let (f, mut r) = (Folder::new(), Random(23));
+    let sketch = Sketch {
+        tiled: true,
+        chunk: (16, 16),
+        compression: LZW,
+        samples: 3,
+        photometric: 2,
+        ..Sketch::plain((70, 50))
+    };
+    let path = f.bytes("a.tif", &sketch.file(&mut r));
+    let pair = Pair::open(&path, &path).unwrap();
+    let windows = Reader::default().windows_keeping(4000, [&path, &path], None, f.path()).unwrap();
+    let parts: Vec<Rect> = (0..40).map(|_| r.part(pair.size())).collect();
+    std::thread::scope(|scope| {
+        for parts in parts.chunks(10) {
+            let (windows, pair) = (&windows, &pair);
+            scope.spawn(move || {
+                for part in parts {
+                    assert_eq!(windows.window(part).unwrap(), pair.crop(part));
+                }
+            });
+        }
+    });
+}
+
 /// A JPEG file whose EXIF data say this orientation.
 fn jpeg(r: &mut Random, size: (u32, u32), orientation: u8) -> Vec<u8> {
     let mut file = Cursor::new(Vec::new());
