@@ -1,6 +1,6 @@
 //! Planes of pixels, and the stereo pair.
 
-#[cfg(feature = "files")]
+#[cfg(all(feature = "files", not(target_arch = "wasm32")))]
 mod bands;
 #[cfg(feature = "files")]
 mod both;

@@ -10,6 +10,7 @@ use super::save::check;
 use super::{Georeference, Plane, pfm, tiff};
 use crate::error::{Error, Reason, Result};
 
+#[cfg(not(target_arch = "wasm32"))]
 pub use super::bands::{Bands, Level, picture_in_bands};
 pub use super::save::{Growing, no_folder, publish, remove, save};
 #[cfg(feature = "cameras")]

@@ -64,6 +64,7 @@ fn align<W: Write + Seek, K: TiffKind>(
     Ok(())
 }
 
+#[cfg(not(target_arch = "wasm32"))]
 /// Writes a large map to `file` from bands of rows, from the top, of any heights that add up to its own; BigTIFF if the map may exceed
 /// plain TIFF.
 pub(in crate::image) fn write_bands(

@@ -12,7 +12,9 @@ mod encode;
 mod geo;
 
 pub(super) use cache::Cache;
-pub(super) use encode::{MAX_PLAIN, encode, write_bands};
+pub(super) use encode::encode;
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) use encode::{MAX_PLAIN, write_bands};
 
 use std::borrow::Cow;
 use std::ops::{Deref, Range};
