@@ -13,6 +13,9 @@ use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Method, PRESETS};
 use mrfgs::region::{Blocks, Region};
 use mrfgs::{Conditioning, Error, Matcher, Prior, Progress};
+use std::collections::BTreeSet;
+use std::io::Write;
+use std::path::PathBuf;
 
 /// Pixels around a block that are matched with it.
 const MARGIN: usize = 128;
@@ -27,12 +30,12 @@ fn fits(region: &Region, range: DisparityRange, method: &Method) -> bool {
 fn blocks_partition_the_view_and_windows_hold_what_they_need() {
     let mut random = Random::new(61);
     let (mut cut, mut refused) = (0, 0);
-    for seed in 0..300 {
+    for seed in 0..200 {
         let size = (random.log_within(1.0, 30_000.0) as usize, random.log_within(1.0, 30_000.0) as usize);
         let (labels, min) = (random.log_within(1.0, 600.0) as i32, random.within(0, 400) as i32 - 200);
         let range = DisparityRange::new(min, min + labels - 1).unwrap();
         let mut method = random.pick(PRESETS).method();
-        method.tiles.memory = random.log_within(8.0, 8192.0) as u32;
+        method.tiles.memory = random.log_within(2.0, 8192.0) as u32;
         method.refinement.right_map = random.pick(&[false, true]);
         let case = format!("seed {seed}, {size:?}, {range:?}, {} MiB", method.tiles.memory);
         let blocks = match Blocks::new(size, range, &method) {
@@ -50,13 +53,18 @@ fn blocks_partition_the_view_and_windows_hold_what_they_need() {
         assert_eq!(blocks.size(), size);
         cut += usize::from(blocks.list().len() > 1);
         let step = 1 << (Plan::new(size.0, size.1, range, &method).unwrap().levels.len() - 1);
-        let mut pixels = 0;
+        let (mut pixels, mut sizes) = (0, BTreeSet::new());
         let mut last: Option<&Rect> = None;
         for block in blocks.list() {
             let (part, window) = (block.part(), block.window());
-            assert!(fits(block, range, &method), "{case}");
+            if sizes.insert(window.size()) {
+                assert!(fits(block, range, &method), "{case}");
+            }
             // Those at a border need no margin there, and may be wider by that.
-            assert!(window.size().0 <= 4096 + 2 * (MARGIN + 800) && window.size().1 <= 4096 + 4 * MARGIN, "{case}: {part:?}");
+            assert!(
+                window.size().0 <= 4096 + 2 * (MARGIN + 800) && window.size().1 <= 4096 + 4 * MARGIN,
+                "{case}: {part:?}"
+            );
             pixels += part.size().0 * part.size().1;
             // Side by side, then the next row of blocks: with the number of pixels, a partition.
             if let Some(last) = last {
@@ -81,7 +89,7 @@ fn blocks_partition_the_view_and_windows_hold_what_they_need() {
             assert!(sample.y.len() <= 1025 || blocks.samples().len() == 1, "{case}");
         }
     }
-    assert!(cut > 50 && refused > 50, "{cut} {refused}");
+    assert!(cut > 30 && refused > 15, "{cut} {refused}");
 }
 
 /// A pair of `size` with a slanted floor and boxes on it, and the right view one row lower if `shifted`.
@@ -90,8 +98,10 @@ fn scene((width, height): (usize, usize), shifted: bool) -> Pair {
         let hash = (x as u32).wrapping_mul(0x9e37_79b9) ^ (y as u32).wrapping_mul(0x85eb_ca6b);
         (hash.wrapping_mul(0xc2b2_ae35) >> 24) as u8
     };
-    let texture = |x: usize, y: usize| ((2 * u16::from(noise(x / 3, y / 3)) + u16::from(noise(x, y))) / 3) as u8;
-    let disparity = |x: usize, y: usize| if x / 150 % 3 == 1 && y / 120 % 2 == 1 { 24 } else { 4 + 12 * y / height };
+    let texture =
+        |x: usize, y: usize| ((2 * u16::from(noise(x / 3, y / 3)) + u16::from(noise(x, y))) / 3) as u8;
+    let disparity =
+        |x: usize, y: usize| if x / 150 % 3 == 1 && y / 120 % 2 == 1 { 24 } else { 4 + 12 * y / height };
     let left = Plane::from_fn(width, height, |x, y| [texture(x + 64, y); 3]);
     let right = Plane::from_fn(width, height, |x, y| {
         let y = y.saturating_sub(usize::from(shifted));
@@ -132,16 +142,21 @@ fn a_pair_larger_than_memory_is_matched_in_blocks() {
         assert_eq!((found.blocks, whole.blocks), (blocks.list().len(), 1), "{preset}");
         assert!(found.blocks > 2, "{preset}: {}", found.blocks);
         assert!(shares.is_sorted() && *shares.last().unwrap() > 0.9, "{preset}: {shares:?}");
-        // The right view is lower, and so it is for each block.
-        assert_eq!(found.conditioning, whole.conditioning, "{preset}");
-        assert!(found.conditioning.offset > 200, "{preset}: {}", found.conditioning);
+        // The right view is lower, and so it is for each block: measured on the whole pair, or in samples.
+        let [found_offset, whole_offset] = [&found, &whole].map(|matched| matched.conditioning.offset);
+        assert!(
+            whole_offset > 200 && found_offset.abs_diff(whole_offset) <= 8,
+            "{preset}: {found_offset} and {whole_offset}"
+        );
+        assert_eq!(blocks.samples().len(), if preset == "default" { 1 } else { 9 });
         let off = moved(&found.maps, &whole.maps);
         assert!(off < 0.1, "{preset}: {off} %, {} blocks", found.blocks);
 
         let mut joined = Maps::blank(pair.size(), true);
         for block in blocks.list() {
             let window = block.window_of(&pair);
-            let job = |method| cpu().job(&window, RANGE).method(method).conditioning(found.conditioning).run();
+            let job =
+                |method| cpu().job(&window, RANGE).method(method).conditioning(found.conditioning).run();
             joined.paste(&block.maps_of(&job(&method).unwrap().maps), block.part());
         }
         assert!(joined == found.maps, "{preset}");
@@ -187,4 +202,62 @@ fn corrections_are_medians() {
     assert_eq!(Conditioning::median(&[low, level, low]), low);
     assert_eq!(Conditioning::median(&[level, level, low]), level);
     assert_eq!(Conditioning::median(&[]), Conditioning::default());
+}
+
+/// `image` at three times its size, between pixels interpolated.
+fn enlarged(image: &Image) -> Image {
+    let (width, height) = image.pixels.size();
+    let rgb = image.to_rgb8();
+    let value = |x: usize, y: usize| {
+        let (left, above) = (x / 3, y / 3);
+        let (right, below) = ((left + 1).min(width - 1), (above + 1).min(height - 1));
+        [0, 1, 2].map(|c| {
+            let along = |y: usize| {
+                (3 - x % 3) * usize::from(rgb[(left, y)][c]) + x % 3 * usize::from(rgb[(right, y)][c])
+            };
+            (((3 - y % 3) * along(above) + y % 3 * along(below) + 4) / 9) as u8
+        })
+    };
+    Image::from_rgb8(&Plane::from_fn(3 * width, 3 * height, value))
+}
+
+/// The seams of real pairs: of five, enlarged to three times their size, hardly a pixel moves.
+#[test]
+fn real_pairs_have_hardly_any_seams() {
+    let Some(folder) = std::env::var_os("MRFGS_MIDDLEBURY").map(PathBuf::from) else {
+        let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
+        return;
+    };
+    let mut method = Method::fast();
+    let (mut all, mut bare) = (Vec::new(), Vec::new());
+    for (name, max) in [("Teddy", 59), ("Cones", 59), ("Dolls", 73), ("Rocks1", 57), ("Motorcycle", 69)] {
+        let pair = Pair::open(folder.join(name).join("im0.png"), folder.join(name).join("im1.png")).unwrap();
+        let pair = Pair::new(enlarged(pair.left()), enlarged(pair.right())).unwrap();
+        let range = DisparityRange::new(0, 3 * max + 2).unwrap();
+        method.tiles.memory = 4096;
+        let whole = cpu().job(&pair, range).method(&method).run().unwrap();
+        method.tiles.memory = 128;
+        let blocks = Blocks::new(pair.size(), range, &method).unwrap();
+        assert!(blocks.list().len() >= 4, "{name}: {}", blocks.list().len());
+        let share_of = |pair_of: &dyn Fn(&Region) -> Rect| {
+            let mut joined = Maps::blank(pair.size(), false);
+            for block in blocks.list() {
+                let window = pair_of(block);
+                let part = pair.crop(&window);
+                let job = cpu().job(&part, range).method(&method).conditioning(whole.conditioning).run();
+                joined.paste(&job.unwrap().maps.crop(&block.part().within(&window)), block.part());
+            }
+            moved(&joined, &whole.maps)
+        };
+        all.push(share_of(&|block| block.window().clone()));
+        bare.push(share_of(&|block| block.part().clone()));
+        println!(
+            "{name}: {} blocks, {:.4} %, without a margin {:.2} %",
+            blocks.list().len(),
+            all[all.len() - 1],
+            bare[bare.len() - 1]
+        );
+    }
+    assert!(all.iter().all(|share| *share < 0.2), "{all:?}");
+    assert!(bare.iter().all(|share| *share > 0.5), "{bare:?}");
 }

@@ -184,7 +184,8 @@ mod tests {
                 let [whole, made] = ["whole", "made"].map(|by| folder.path().join(format!("{by}.{name}")));
                 Writer::default().disparity(&whole, &map).unwrap();
                 Writer::default().disparity_in_bands(&made, size, &mut bands(&map).into_iter()).unwrap();
-                let [found, expected] = [&made, &whole].map(|path| Reader::default().disparity(path).unwrap());
+                let [found, expected] =
+                    [&made, &whole].map(|path| Reader::default().disparity(path).unwrap());
                 assert!(found == expected, "{name}, {size:?}");
                 if name != "a.png" {
                     assert!(fs::read(&whole).unwrap() == fs::read(&made).unwrap(), "{name}, {size:?}");

@@ -79,6 +79,11 @@ impl Tiles {
         })
     }
 
+    /// Like [`Tiles::new`]; `None` if no tile is small enough, without the time to find what would be.
+    pub(crate) fn if_any_fit(whole: &Plan) -> Option<Self> {
+        Self::at_all_sizes(whole, OVERLAP).ok()
+    }
+
     /// The tiles, if tiles of the match at twice the size fit too; else the MiB that the smallest ones need.
     fn at_all_sizes(whole: &Plan, overlap: usize) -> Result<Self, u64> {
         let tiles = Self::at_one_size(whole, overlap)?;

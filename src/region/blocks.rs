@@ -18,11 +18,11 @@ const MARGIN: usize = 128;
 const LARGEST: usize = 4096;
 /// Samples in which corrections are measured lie in the middle of the parts of a grid with this many columns and rows.
 const SAMPLES: usize = 3;
-/// Width and height of a sample in pixels.
+/// Largest and smallest width and height of a sample in pixels.
 const SAMPLE: usize = 1024;
-/// Bytes that measuring takes for each pixel. A pair is measured as a whole if that fits in the memory of the method, or is little.
+const LEAST_SAMPLE: usize = 256;
+/// Bytes that measuring takes for each pixel. A pair is measured as a whole if that fits in the memory of the method.
 const BYTES: u64 = 72;
-const LITTLE: u64 = 1 << 27;
 
 /// A pair in blocks, each matched alone. Their cut depends on the size of the pair, the disparities and the method alone, so it is the
 /// same on every machine.
@@ -54,7 +54,8 @@ impl Blocks {
         let across = Axis::new(width, reach.map(|reach| MARGIN + reach), step);
         let down = Axis::new(height, [MARGIN; 2], step);
         let smallest = (across.crop(across.most()), down.crop(down.most()));
-        let sides = std::iter::successors(Some(LARGEST), |side| Some(side * 7 / 8)).take_while(|side| *side >= step);
+        let sides =
+            std::iter::successors(Some(LARGEST), |side| Some(side * 3 / 4)).take_while(|side| *side >= step);
         let windows = sides.map(|side| {
             let crop = |axis: &Axis| axis.crop(axis.length().div_ceil(side));
             (crop(&across), crop(&down))
@@ -62,8 +63,9 @@ impl Blocks {
         // With a prior or without one, the blocks are the same.
         let plan = |w: usize, h: usize| Plan::new(w, h, range, method).map(|plan| plan.with_prior(true));
         let time = |&(w, h): &(usize, usize)| {
-            let tiles = Tiles::new(&plan(w, h).ok()?).ok()?;
-            let matched: usize = tiles.list().iter().map(|tile| tile.crop.size().0 * tile.crop.size().1).sum();
+            let tiles = Tiles::if_any_fit(&plan(w, h).ok()?)?;
+            let matched: usize =
+                tiles.list().iter().map(|tile| tile.crop.size().0 * tile.crop.size().1).sum();
             let windows = across.cropped(w) as f64 * down.cropped(h) as f64;
             Some(windows * matched as f64 / (w * h) as f64)
         };
@@ -100,18 +102,21 @@ impl Blocks {
     #[must_use]
     pub fn samples(&self) -> Vec<Rect> {
         let (width, height) = self.size;
-        if BYTES * (width * height) as u64 <= self.memory.max(LITTLE) {
+        if BYTES * (width * height) as u64 <= self.memory {
             return vec![Rect::whole(self.size)];
         }
+        let half = ((self.memory / BYTES).isqrt() as usize).clamp(LEAST_SAMPLE, SAMPLE) / 2;
         let around = |middle: usize, [before, after]: [usize; 2], length: usize| {
             // Blocks of 2 x 2 pixels stay whole.
-            let start = middle.saturating_sub(SAMPLE / 2 + before) & !1;
-            start..(middle + SAMPLE / 2 + after).min(length)
+            let start = middle.saturating_sub(half + before) & !1;
+            start..(middle + half + after).min(length)
         };
         let along = |length: usize, reach: [usize; 2]| {
             (0..SAMPLES).map(move |i| around((2 * i + 1) * length / (2 * SAMPLES), reach, length))
         };
-        along(height, [0; 2]).flat_map(|y| along(width, self.reach).map(move |x| Rect { x, y: y.clone() })).collect()
+        along(height, [0; 2])
+            .flat_map(|y| along(width, self.reach).map(move |x| Rect { x, y: y.clone() }))
+            .collect()
     }
 }
 

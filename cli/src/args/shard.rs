@@ -59,7 +59,8 @@ mod tests {
     #[test]
     fn every_block_is_in_one_shard() {
         for count in [1, 2, 3, 8, 64] {
-            let held = |block: usize| (0..count).filter(|&index| Shard { index, count }.holds_block(block)).count();
+            let held =
+                |block: usize| (0..count).filter(|&index| Shard { index, count }.holds_block(block)).count();
             assert!((0..100).all(|block| held(block) == 1), "{count}");
         }
     }

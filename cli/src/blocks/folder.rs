@@ -112,7 +112,7 @@ pub(crate) struct BlockFolder {
 }
 
 impl BlockFolder {
-    /// Opens the folder `path` for a match by `request`, and creates it if it does not exist.
+    /// The folder `path` for a match by `request`. It may not exist.
     ///
     /// # Errors
     /// If it belongs to another match, or holds something else.
@@ -121,14 +121,15 @@ impl BlockFolder {
         let text = files::json_text(path, request)?;
         let request: Value = serde_json::from_str(&text).map_err(|e| Error::write(path, e.to_string()))?;
         files::folder_place(path)?;
-        files::create_folder(path).map_err(|e| Error::write(path, e))?;
         let named = path.join(MATCH);
         let known = match fs::read(&named) {
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
-                let mut entries = fs::read_dir(path).map_err(|e| Error::write(path, e))?;
                 // Another run may be beginning.
                 let is_ours = |name: &str| name.starts_with('.');
-                if entries.any(|entry| entry.is_ok_and(|entry| !is_ours(&entry.file_name().to_string_lossy()))) {
+                let is_foreign = |entry: fs::DirEntry| !is_ours(&entry.file_name().to_string_lossy());
+                if fs::read_dir(path)
+                    .is_ok_and(|mut entries| entries.any(|entry| entry.is_ok_and(is_foreign)))
+                {
                     let reason = Reason::of_request("the folder holds other files; give a new one");
                     return Err(Error::write(path, reason).into());
                 }
@@ -151,16 +152,12 @@ impl BlockFolder {
         Ok(Self { path: path.to_owned(), request, known })
     }
 
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// What an earlier run has found, if there was one.
     pub(crate) fn known(&self) -> Option<Known> {
         self.known
     }
 
-    /// Describes the match in the folder, which then takes its `blocks`.
+    /// Describes the match in the folder, which then takes its `blocks`, and is created if it does not exist.
     pub(crate) fn begin(self, known: Known, blocks: &Blocks) -> Result<BlockFiles> {
         let (width, height) = blocks.size();
         let parts: Vec<Rect> = blocks.list().iter().map(|block| block.part().clone()).collect();
@@ -168,6 +165,7 @@ impl BlockFolder {
         let path = self.path.join(MATCH);
         let text = files::json_text(&path, &manifest)?;
         if self.known.is_none() {
+            files::create_folder(&self.path).map_err(|e| Error::write(&self.path, e))?;
             write::save(&path, text.as_bytes())?;
         }
         Ok(BlockFiles { folder: self.path, of: identity(&text), size: (width, height), parts })

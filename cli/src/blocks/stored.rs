@@ -39,7 +39,13 @@ pub(crate) struct BlockRecord {
 
 impl BlockRecord {
     /// The record of the block `part` of the match `of`.
-    pub(super) fn new(of: &str, part: &Rect, matched: &mrfgs::Matched, note: Option<String>, seconds: f64) -> Self {
+    pub(super) fn new(
+        of: &str,
+        part: &Rect,
+        matched: &mrfgs::Matched,
+        note: Option<String>,
+        seconds: f64,
+    ) -> Self {
         Self {
             of: of.to_owned(),
             part: numbers(part),
@@ -154,7 +160,9 @@ impl Rows {
             let (of_raw, rest) = rest.split_at(4 * width);
             let start = disparity.len();
             disparity.extend(sums(of_disparity));
-            raw.extend(words(of_raw).zip(&disparity[start..]).map(|(more, final_one)| more.wrapping_add(*final_one)));
+            raw.extend(
+                words(of_raw).zip(&disparity[start..]).map(|(more, final_one)| more.wrapping_add(*final_one)),
+            );
             let (of_confidence, rest) = rest.split_at(width);
             confidence.extend_from_slice(of_confidence);
             validity.extend_from_slice(&rest[..width]);
@@ -198,7 +206,12 @@ mod tests {
     /// Maps of `size` that hold all kinds of values.
     pub(crate) fn maps((width, height): (usize, usize), right: bool) -> Maps {
         let value = |x: usize, y: usize| (x * 977 + y * 7919) as i32;
-        let disparity = Plane::from_fn(width, height, |x, y| if (x + y) % 7 == 0 { i32::MIN } else { value(x, y) - 9000 });
+        let disparity =
+            Plane::from_fn(
+                width,
+                height,
+                |x, y| if (x + y) % 7 == 0 { i32::MIN } else { value(x, y) - 9000 },
+            );
         let bytes = Plane::from_fn(width, height, |x, y| (value(x, y) % 256) as u8);
         Maps {
             raw: disparity.map(|d| d.wrapping_mul(3)),

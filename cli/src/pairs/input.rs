@@ -330,7 +330,16 @@ impl<V> Input<V> {
     /// The same input with other views of the same pair, such as a window of them.
     pub(crate) fn with_views<W>(self, change: impl FnOnce(V) -> Result<W>) -> Result<Input<W>> {
         let Self { pair, size, range, by_matches, calibration, by_depth, remedy, rectification } = self;
-        Ok(Input { pair: change(pair)?, size, range, by_matches, calibration, by_depth, remedy, rectification })
+        Ok(Input {
+            pair: change(pair)?,
+            size,
+            range,
+            by_matches,
+            calibration,
+            by_depth,
+            remedy,
+            rectification,
+        })
     }
 
     /// The files of the calibration, for a record.

@@ -209,7 +209,8 @@ mod tests {
             let tiles = packed_tiles(&map).unwrap();
             for (max_bytes, big) in [(MAX_BYTES, false), (0, true)] {
                 let mut file = Cursor::new(Vec::new());
-                write_tiles(&mut file, (width as u32, height as u32), tiles.clone(), None, max_bytes).unwrap();
+                write_tiles(&mut file, (width as u32, height as u32), tiles.clone(), None, max_bytes)
+                    .unwrap();
                 assert_eq!(read(file.get_ref()), (bits.clone(), big), "{width} x {height}");
                 let raster = super::super::decode(file.get_ref(), 1 << 20, None).unwrap();
                 let crate::image::raster::Samples::Float(values) = raster.samples else { panic!("float") };

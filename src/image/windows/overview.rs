@@ -43,7 +43,10 @@ impl PairWindows {
             }
         }
         let [left, right] = views.map(|view| view.image(width / factor));
-        Ok(Overview { pair: Pair { orientations, doubts: self.doubts.clone(), ..Pair::new(left, right)? }, factor })
+        Ok(Overview {
+            pair: Pair { orientations, doubts: self.doubts.clone(), ..Pair::new(left, right)? },
+            factor,
+        })
     }
 }
 
@@ -68,6 +71,9 @@ impl Joined {
 
     fn image(self, width: usize) -> Image {
         let height = self.pixels.len() / width;
-        Image { pixels: Plane::new(width, height, self.pixels), masked: Plane::new(width, height, self.masked) }
+        Image {
+            pixels: Plane::new(width, height, self.pixels),
+            masked: Plane::new(width, height, self.masked),
+        }
     }
 }

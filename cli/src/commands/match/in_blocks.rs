@@ -57,7 +57,8 @@ struct Asked<'a> {
 impl<'a> Asked<'a> {
     fn new(request: &'a Request) -> Result<Self> {
         let args = request.args;
-        let prints = |paths: &mut dyn Iterator<Item = &'a Path>| paths.map(Fingerprint::of).collect::<Result<_>>();
+        let prints =
+            |paths: &mut dyn Iterator<Item = &'a Path>| paths.map(Fingerprint::of).collect::<Result<_>>();
         let pair = &args.pair;
         let images = std::iter::once(&*pair.left).chain(pair.right.as_deref());
         let beside = input::beside(&pair.left).unwrap_or_default();
@@ -102,7 +103,9 @@ impl Place {
 
 /// The number of complete blocks in the folder of `--blocks`, and the number of all; `None` before the first run.
 pub(super) fn progress(request: &Request, blocks: &Blocks) -> Result<Option<(usize, usize)>> {
-    let Some(path) = request.args.blocks.blocks.as_ref().filter(|path| path.is_dir()) else { return Ok(None) };
+    let Some(path) = request.args.blocks.blocks.as_ref().filter(|path| path.is_dir()) else {
+        return Ok(None);
+    };
     let folder = BlockFolder::open(path, &Asked::new(request)?)?;
     let Some(known) = folder.known() else { return Ok(None) };
     let files = folder.begin(known, blocks)?;
@@ -177,7 +180,7 @@ fn input_of(request: &Request, folder: &BlockFolder) -> Result<Input<LargePair>>
         return request.input()?.with_views(|pair| Ok(LargePair::of_pair(pair, method)));
     };
     let range = folder.known().map(|known| known.range()).transpose()?;
-    request.input_of(LargePair::of_files(files.open(folder.path())?, method).with_range(range))
+    request.input_of(LargePair::of_files(files.open(&request.scratch())?, method).with_range(range))
 }
 
 /// The corrections of all blocks.
@@ -225,14 +228,18 @@ impl BlockRun<'_> {
             return Ok(());
         }
         let execution = args.execution.execution();
-        let mut matcher = Matcher::builder().method(self.request.method.clone()).execution(execution).build()?;
+        let mut matcher =
+            Matcher::builder().method(self.request.method.clone()).execution(execution).build()?;
         let mut bar = Counter::of_blocks(count, count - left.len(), args.quiet);
         let mut told = None;
         // Number of consecutive blocks claimed by other runs.
         let mut taken = 0;
         while let Some(block) = left.pop_front() {
             let part = self.blocks.list()[block].part();
-            bar.begin(&format!("columns {} to {}, rows {} to {}", part.x.start, part.x.end, part.y.start, part.y.end));
+            bar.begin(&format!(
+                "columns {} to {}, rows {} to {}",
+                part.x.start, part.x.end, part.y.start, part.y.end
+            ));
             let Some(_claim) = self.files.claim(block)? else {
                 left.push_back(block);
                 taken += 1;
@@ -318,16 +325,24 @@ impl BlockRun<'_> {
         );
         record.rectified = args.rectify;
         record.trust = input.rectification.as_ref().and_then(|by| by.trust().copied());
-        let by_bands = !files::is_printed(args.output()) && also.iter().all(|(word, _)| word.comes_by_bands());
+        let by_bands =
+            !files::is_printed(args.output()) && also.iter().all(|(word, _)| word.comes_by_bands());
         let said = if by_bands {
             self.write_by_bands(also, &template, &record)?
         } else {
             let maps = self.whole()?;
-            let pair = args.also.show_left().then(|| input.pair.window(&Rect::whole(files.size()))).transpose()?;
+            let pair =
+                args.also.show_left().then(|| input.pair.window(&Rect::whole(files.size()))).transpose()?;
             let outcome = template.outcome(&maps, pair.as_ref().map(mrfgs::Pair::left));
             write_outputs(args, also, &outcome, &record)?
         };
-        say_end(args, &template.outcome(&thin, None), input.has_found_range(), input.unit().as_deref(), &said);
+        say_end(
+            args,
+            &template.outcome(&thin, None),
+            input.has_found_range(),
+            input.unit().as_deref(),
+            &said,
+        );
         Ok(())
     }
 
@@ -387,7 +402,8 @@ impl BlockRun<'_> {
         written.note(output, writer.disparity_in_bands(output, files.size(), &mut files.bands().map(map)))?;
         for (word, path) in also {
             let (size, bands) = (files.size(), files.bands());
-            let made = args.also.write_in_bands(word, path, size, bands, &|maps| template.outcome(maps, None));
+            let made =
+                args.also.write_in_bands(word, path, size, bands, &|maps| template.outcome(maps, None));
             said.extend(written.note(path, made)?);
         }
         if let Some(path) = args.json.as_deref() {
@@ -424,7 +440,8 @@ impl BlockRun<'_> {
     /// Prints the warnings that maps give.
     fn warn(&self, thin: &Maps, prior: Option<PriorUse>) {
         let (width, height) = self.blocks.list()[0].window().size();
-        let looks = Plan::new(width, height, self.input.range, &self.request.method).map_or(1, |plan| plan.looks());
+        let looks =
+            Plan::new(width, height, self.input.range, &self.request.method).map_or(1, |plan| plan.looks());
         let mut warnings = check::warnings_of(thin, self.input.range, looks);
         // As for a match in one go.
         let found = self.input.has_found_range();

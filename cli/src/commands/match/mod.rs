@@ -17,8 +17,8 @@ use mrfgs::sigma::Sigma;
 use mrfgs::{Matcher, check};
 
 use crate::args::{
-    BlockArgs, CameraArgs, CameraNeed, ExecutionArgs, MethodArgs, PriorArgs, PriorView, RectificationArgs, RegionArgs,
-    Sign,
+    BlockArgs, CameraArgs, CameraNeed, ExecutionArgs, MethodArgs, PriorArgs, PriorView, RectificationArgs,
+    RegionArgs, Sign,
 };
 use crate::failure::{Failure, Result};
 use crate::outputs::{
@@ -179,10 +179,16 @@ impl<'a> Request<'a> {
         self.args.pair.of_views(views, self.args.sign, self.need.is_some(), Some(&self.args.numbers))
     }
 
-    /// The files of a pair that can be read by windows; `None` for raw pairs and files with both views, which are read whole.
+    /// The files of a pair that can be read by windows; `None` for raw pairs, files with both views and pipes, which are read whole.
     fn files(&self) -> Option<PairFiles<'_>> {
-        let right = self.args.pair.right.as_deref().filter(|_| self.rectifying.is_none())?;
-        Some(PairFiles { reader: self.args.pair.reading.reader(), left: &self.args.pair.left, right, mask: self.args.pair.mask.as_deref() })
+        let pair = &self.args.pair;
+        let right = pair.right.as_deref().filter(|_| self.rectifying.is_none())?;
+        let files =
+            PairFiles { reader: pair.reading.reader(), left: &pair.left, right, mask: pair.mask.as_deref() };
+        // What does not exist is reported when it is read.
+        let is_pipe = |path: &Path| path.metadata().is_ok_and(|about| !about.is_file());
+        let is_any_pipe = [files.left, files.right].into_iter().chain(files.mask).any(is_pipe);
+        Some(files).filter(|_| !is_any_pipe)
     }
 
     /// The folder for files that exist as long as this program needs them.
@@ -197,7 +203,9 @@ impl<'a> Request<'a> {
             return Ok(true);
         }
         // Errors of the files are reported when these are read.
-        let Some(Ok((width, height))) = self.files().map(|files| files.reader.size(files.left)) else { return Ok(false) };
+        let Some(Ok((width, height))) = self.files().map(|files| files.reader.size(files.left)) else {
+            return Ok(false);
+        };
         let least = Plan::new(width, height, DisparityRange::new(0, 0)?, &self.method)?;
         Ok(self.args.region.roi.is_none() && Tiles::new(&least).is_err())
     }
@@ -210,7 +218,9 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     }
     stop::listen();
     let request = Request::new(&args)?;
-    if args.dry_run && let Some(files) = request.files() {
+    if args.dry_run
+        && let Some(files) = request.files()
+    {
         return dry_run(&request, files);
     }
     if request.goes_by_blocks()? {
@@ -287,7 +297,8 @@ fn run_on(request: &Request, input: Input, read: Rect) -> Result<()> {
     let (width, height) = region.as_ref().map_or(input.size, |region| region.window().size());
     let view = PriorView { size: input.size, sign: args.sign, rig: input.as_taken(known) };
     let prior = args.prior.read(view)?;
-    let prior = prior.map(|prior| if read == Rect::whole(input.size) { prior } else { Arc::new(prior.crop(&read)) });
+    let prior =
+        prior.map(|prior| if read == Rect::whole(input.size) { prior } else { Arc::new(prior.crop(&read)) });
     if args.dry_run {
         let plan = Plan::new(width, height, range, method)?.with_prior(prior.is_some());
         return Ok(console::print(&plan::describe(&plan)?)?);
@@ -295,8 +306,7 @@ fn run_on(request: &Request, input: Input, read: Rect) -> Result<()> {
     let mut matcher = Matcher::builder().execution(args.execution.execution()).build()?;
     let searched = input.searched(|wider| check_range(args, wider).is_ok());
     let searched = searched.in_region(inner.as_ref()).with_prior(prior.as_ref());
-    let (matched, time) =
-        matching::run(&mut matcher, &input.pair, searched, method, None, args.quiet, None)?;
+    let (matched, time) = matching::run(&mut matcher, &input.pair, searched, method, None, args.quiet, None)?;
     let range = matched.range();
     let mut pair = input.pair.clone();
     if let Some((part, inner)) = part.zip(inner) {
