@@ -201,7 +201,7 @@ fn a_folder_takes_one_match() {
     // A pair that cannot be matched makes no folder.
     run(&folder, &line("other.pfm", "--blocks new").replace("right.tif", "none.tif")).failed(1, "none.tif");
     run(&folder, &line("other.pfm", "--blocks new").replace("--max-disparity 31", "--max-disparity 5000"))
-        .failed(2, "5000");
+        .failed(2, "--memory: 64 MiB of memory is too little");
     assert!(!folder.join("new").exists());
 }
 

@@ -41,6 +41,18 @@ const NOT_RUN: &[(&str, &str)] = &[
     ),
     ("mrfgs sequence left right - --max-disparity 63 | ffmpeg -i - disparity.gif", "needs ffmpeg"),
     ("mrfgs sequence left.mp4 right.mp4 disparity.mp4 --method fast", "needs ffmpeg"),
+    (
+        "parallel mrfgs match left.tif right.tif map.tif --max-disparity 75 --blocks job --threads 2 ::: $(seq 4)",
+        "needs GNU parallel",
+    ),
+    (
+        "sbatch --array=1-8 --wrap 'mrfgs match left.tif right.tif map.tif --max-disparity 75 --blocks job'",
+        "needs Slurm; scripts/slurm tries it",
+    ),
+    (
+        "mrfgs batch pairs.csv maps --shard $((JOB_COMPLETION_INDEX + 1))/8",
+        "a Kubernetes job; the chapter on many pairs runs batch",
+    ),
     ("parallel mrfgs batch pairs.csv maps --threads 2 --shard {}/8 ::: $(seq 8)", "needs GNU parallel"),
     (
         "sbatch --array=1-8 --wrap 'mrfgs batch pairs.csv maps --shard $SLURM_ARRAY_TASK_ID/8'",

@@ -227,7 +227,7 @@ impl BlockRun<'_> {
         if left.is_empty() {
             return Ok(());
         }
-        let execution = args.execution.execution();
+        let execution = self.request.execution.clone();
         let mut matcher =
             Matcher::builder().method(self.request.method.clone()).execution(execution).build()?;
         let mut bar = Counter::of_blocks(count, count - left.len(), args.quiet);

@@ -10,7 +10,7 @@ use mrfgs::calibration::cameras::ThirdCamera;
 use mrfgs::image::{Pair, Rect, pfm, write};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::program::tiles::Tiles;
-use mrfgs::options::{DisparityRange, Method};
+use mrfgs::options::{DisparityRange, Execution, Method};
 use mrfgs::rectification::Options;
 use mrfgs::region::{Blocks, Region};
 use mrfgs::sigma::Sigma;
@@ -138,6 +138,7 @@ impl Args {
 /// The command line, checked.
 struct Request<'a> {
     args: &'a Args,
+    execution: Execution,
     method: Method,
     /// How raw images are rectified, if they are.
     rectifying: Option<Options>,
@@ -151,6 +152,8 @@ struct Request<'a> {
 
 impl<'a> Request<'a> {
     fn new(args: &'a Args) -> Result<Self> {
+        // First, since it also limits the threads that read the images.
+        let execution = args.execution.execution();
         let method = args.also.made_by(args.method.method()?)?;
         let cameras = args.also.take_cameras();
         let rectifying = args.rectification.options_if(args.rectify)?;
@@ -165,7 +168,7 @@ impl<'a> Request<'a> {
                 return Err(Failure::usage(flag, reason));
             }
         }
-        Ok(Self { args, method, rectifying, cameras, need, third })
+        Ok(Self { args, execution, method, rectifying, cameras, need, third })
     }
 
     /// The whole pair.
@@ -278,7 +281,7 @@ fn dry_run(request: &Request, files: PairFiles) -> Result<()> {
 
 /// Matches a pair, or a region of it; `read` is the part of the views that was read.
 fn run_on(request: &Request, input: Input, read: Rect) -> Result<()> {
-    let Request { args, method, cameras, need, third, .. } = request;
+    let Request { args, execution, method, cameras, need, third, .. } = request;
     let range = input.range;
     if !args.quiet {
         input.say_range(args.sign, "");
@@ -303,7 +306,7 @@ fn run_on(request: &Request, input: Input, read: Rect) -> Result<()> {
         let plan = Plan::new(width, height, range, method)?.with_prior(prior.is_some());
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
-    let mut matcher = Matcher::builder().execution(args.execution.execution()).build()?;
+    let mut matcher = Matcher::builder().execution(execution.clone()).build()?;
     let searched = input.searched(|wider| check_range(args, wider).is_ok());
     let searched = searched.in_region(inner.as_ref()).with_prior(prior.as_ref());
     let (matched, time) = matching::run(&mut matcher, &input.pair, searched, method, None, args.quiet, None)?;
