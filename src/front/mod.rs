@@ -12,6 +12,8 @@ pub(crate) mod illumination;
 #[cfg(feature = "paper")]
 pub mod label_range;
 pub mod matches;
+#[cfg(all(feature = "files", not(target_arch = "wasm32")))]
+mod overview;
 #[cfg(feature = "paper")]
 mod paper;
 mod parts;
@@ -28,6 +30,8 @@ pub use prepared::Prepared;
 
 /// Warns of likely faults of a pair, and finds its disparity range.
 pub mod check {
+    #[cfg(all(feature = "files", not(target_arch = "wasm32")))]
+    pub use super::overview::{overview, range_of_overview, warnings_of_overview};
     pub use super::parts::Part;
     pub use super::range::{beyond, goes_beyond, range, range_of_cameras, wider};
     pub use super::warnings::{Warning, damaged, of_prior, warnings, warnings_of};

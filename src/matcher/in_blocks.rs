@@ -2,8 +2,7 @@
 
 use super::{Matched, Matcher, Request};
 use crate::error::Result;
-use crate::front::conditioning::Conditioning;
-use crate::image::{Pair, Rect};
+use crate::image::Pair;
 use crate::maps::Maps;
 use crate::plan::Plan;
 use crate::prior::PriorUse;
@@ -24,9 +23,8 @@ impl Matcher {
         let known = match request.known {
             Some(known) => known,
             None => {
-                let of = |part: &Rect| Conditioning::measured(&pair.crop(part), range, method);
-                let measured = async || blocks.samples().iter().map(of).collect::<Result<Vec<_>>>();
-                Conditioning::median(&self.threads.run(pair.size().0 * pair.size().1, measured).await??)
+                let measured = async || blocks.conditioning(|part| Ok(pair.crop(part)));
+                self.threads.run(pair.size().0 * pair.size().1, measured).await??
             }
         };
         let count = blocks.list().len();

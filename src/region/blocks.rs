@@ -2,7 +2,8 @@
 
 use super::Region;
 use crate::error::{BudgetError, Error, Result};
-use crate::image::Rect;
+use crate::front::conditioning::Conditioning;
+use crate::image::{Pair, Rect};
 use crate::options::{DisparityRange, Method};
 use crate::plan::Plan;
 use crate::program::tiles::{Axis, Tiles};
@@ -26,14 +27,14 @@ const BYTES: u64 = 72;
 
 /// A pair in blocks, each matched alone. Their cut depends on the size of the pair, the disparities and the method alone, so it is the
 /// same on every machine.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Blocks {
     size: (usize, usize),
     list: Vec<Region>,
     /// Pixels to the left and to the right of a part of the left view that hold its matches.
     reach: [usize; 2],
-    /// The memory of the method in bytes.
-    memory: u64,
+    range: DisparityRange,
+    method: Method,
 }
 
 impl Blocks {
@@ -80,8 +81,7 @@ impl Blocks {
                 window: Rect { x: window_x, y: window_y.clone() },
             })
         });
-        let memory = u64::from(method.tiles.memory) << 20;
-        Ok(Self { size: (width, height), list: list.collect(), reach, memory })
+        Ok(Self { size: (width, height), list: list.collect(), reach, range, method: method.clone() })
     }
 
     /// (width, height) of the pair.
@@ -97,15 +97,24 @@ impl Blocks {
         &self.list
     }
 
-    /// The parts of the pair in which the corrections of all blocks are measured: see [`Conditioning::median`](crate::Conditioning::median).
-    /// They are windows in the middle of the parts of a grid, or all of the pair if the memory holds it.
+    /// The corrections of all blocks: the median of those in the [samples](Self::samples), which `window` reads.
+    ///
+    /// # Errors
+    /// The errors of `window` and of [`Conditioning::measured`].
+    pub fn conditioning(&self, window: impl Fn(&Rect) -> Result<Pair>) -> Result<Conditioning> {
+        let measured = |part: &Rect| Conditioning::measured(&window(part)?, self.range, &self.method);
+        Ok(Conditioning::median(&self.samples().iter().map(measured).collect::<Result<Vec<_>>>()?))
+    }
+
+    /// The parts of the pair in which the corrections of all blocks are [measured](Self::conditioning). They are windows in the middle of the parts of a grid, or all of the pair if the memory holds it.
     #[must_use]
     pub fn samples(&self) -> Vec<Rect> {
         let (width, height) = self.size;
-        if BYTES * (width * height) as u64 <= self.memory {
+        let memory = u64::from(self.method.tiles.memory) << 20;
+        if BYTES * (width * height) as u64 <= memory {
             return vec![Rect::whole(self.size)];
         }
-        let half = ((self.memory / BYTES).isqrt() as usize).clamp(LEAST_SAMPLE, SAMPLE) / 2;
+        let half = ((memory / BYTES).isqrt() as usize).clamp(LEAST_SAMPLE, SAMPLE) / 2;
         let around = |middle: usize, [before, after]: [usize; 2], length: usize| {
             // Blocks of 2 x 2 pixels stay whole.
             let start = middle.saturating_sub(half + before) & !1;

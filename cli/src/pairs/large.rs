@@ -10,9 +10,6 @@ use mrfgs::image::{Georeference, Pair, Rect};
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::{Error, Result};
 
-/// Bytes that sparse matches and warnings take for each pixel of an overview.
-const BYTES: u64 = 128;
-
 /// The files of a rectified pair, and how to read them.
 #[derive(Clone, Copy)]
 pub(crate) struct PairFiles<'a> {
@@ -57,8 +54,8 @@ enum Pixels {
 /// A pair that is read by windows. What concerns all of it comes from an overview, which is read on first use.
 pub(crate) struct LargePair {
     pixels: Pixels,
-    /// Most pixels of the overview, by the memory of the method.
-    most: usize,
+    /// Its memory limits the overview.
+    method: Method,
     overview: OnceCell<Overview>,
     /// The range, if it is known already.
     range: Option<DisparityRange>,
@@ -66,9 +63,7 @@ pub(crate) struct LargePair {
 
 impl LargePair {
     fn new(pixels: Pixels, method: &Method) -> Self {
-        let most = (u64::from(method.tiles.memory) << 20) / BYTES;
-        let most = usize::try_from(most).unwrap_or(usize::MAX);
-        Self { pixels, most, overview: OnceCell::new(), range: None }
+        Self { pixels, method: method.clone(), overview: OnceCell::new(), range: None }
     }
 
     /// The pair in `windows`, with the memory of `method`.
@@ -116,7 +111,7 @@ impl LargePair {
         }
         let overview = match &self.pixels {
             Pixels::Whole(pair) => Overview { pair: pair.clone(), factor: 1 },
-            Pixels::Files(windows) => windows.overview(self.most)?,
+            Pixels::Files(windows) => check::overview(windows, &self.method)?,
         };
         Ok(self.overview.get_or_init(|| overview))
     }
@@ -131,30 +126,12 @@ impl LargePair {
         if let Some(range) = self.range {
             return Ok(range);
         }
-        let Overview { pair, factor } = self.overview()?;
-        let found = match doffs {
-            Some(doffs) => check::range_of_cameras(pair, doffs / *factor as f64)?,
-            None => check::range(pair)?,
-        };
-        let scaled = |end: i32| i32::try_from(*factor).unwrap_or(i32::MAX).saturating_mul(end);
-        DisparityRange::new(scaled(found.min), scaled(found.max))
+        check::range_of_overview(self.overview()?, doffs)
     }
 
     /// Warnings about the pair, from its overview; `range` is that of the user, if there is one.
     pub(crate) fn warnings(&self, range: Option<DisparityRange>) -> Result<Vec<Warning>> {
-        let Overview { pair, factor } = self.overview()?;
-        let factor = i32::try_from(*factor).unwrap_or(i32::MAX);
-        let range = range.map(|DisparityRange { min, max }| DisparityRange {
-            min: min.div_euclid(factor),
-            max: -(-max).div_euclid(factor),
-        });
-        let mut warnings = check::warnings(pair, range);
-        for warning in &mut warnings {
-            if let Warning::NotRectified { offset } = warning {
-                *offset *= factor.unsigned_abs();
-            }
-        }
-        Ok(warnings)
+        Ok(check::warnings_of_overview(self.overview()?, range))
     }
 }
 

@@ -146,7 +146,7 @@ pub(super) fn run(request: &Request) -> Result<()> {
     }
     let found = match folder.known() {
         Some(known) => known,
-        None => Known::new(range, stop::at_once(|| corrections(&input, &blocks, method))?),
+        None => Known::new(range, stop::at_once(|| blocks.conditioning(|part| input.pair.window(part)))?),
     };
     input.pair.forget_overview();
     let files = folder.begin(found, &blocks)?;
@@ -181,13 +181,6 @@ fn input_of(request: &Request, folder: &BlockFolder) -> Result<Input<LargePair>>
     };
     let range = folder.known().map(|known| known.range()).transpose()?;
     request.input_of(LargePair::of_files(files.open(&request.scratch())?, method).with_range(range))
-}
-
-/// The corrections of all blocks.
-fn corrections(input: &Input<LargePair>, blocks: &Blocks, method: &Method) -> Result<Conditioning> {
-    let measure = |part: &Rect| Conditioning::measured(&input.pair.window(part)?, input.range, method);
-    let measured = blocks.samples().iter().map(measure).collect::<mrfgs::Result<Vec<_>>>()?;
-    Ok(Conditioning::median(&measured))
 }
 
 /// A run that matches some of the blocks.
