@@ -18,17 +18,20 @@ Raw images are rectified by a calibration of OpenCV, ROS, Kalibr or Middlebury, 
 >>> rectification.rig.depth(matched.disparity)              # float32, in the unit of the baseline
 >>> rectification.rig.points(matched, left).save("scene.ply")
 
-`Rig` does the same for a pair that is already rectified, `Matcher.match_all` matches many pairs, and `evaluate` compares a map with the
-ground truth, read by `read_disparity`.
+`Rig` does the same for a pair that is already rectified, `Matcher.match_all` matches the frames of a video, `match_many` pairs of
+different scenes, `Blocks` a pair that is larger than memory, and `evaluate` compares a map with the ground truth, read by `read_disparity`.
 """
 
+from ._many import match_many
 from ._mrfgs import (
+    Blocks,
     Calibration,
     Drift,
     Matched,
     MatchedSequence,
     Matcher,
     MatchWarning,
+    PairWindows,
     Points,
     Rectification,
     Rig,
@@ -44,12 +47,14 @@ from ._mrfgs import (
 )
 
 __all__ = [
+    "Blocks",
     "Calibration",
     "Drift",
     "Matched",
     "MatchedSequence",
     "Matcher",
     "MatchWarning",
+    "PairWindows",
     "Points",
     "Rectification",
     "Rig",
@@ -58,6 +63,7 @@ __all__ = [
     "__version__",
     "evaluate",
     "match",
+    "match_many",
     "options",
     "presets",
     "read_disparity",

@@ -8,12 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
+    "Blocks",
     "Calibration",
     "Drift",
     "Matched",
     "MatchedSequence",
     "Matcher",
     "MatchWarning",
+    "PairWindows",
     "Points",
     "Rectification",
     "Rig",
@@ -22,6 +24,7 @@ __all__ = [
     "__version__",
     "evaluate",
     "match",
+    "match_many",
     "options",
     "presets",
     "read_disparity",
@@ -150,6 +153,70 @@ class MatchedSequence(Iterator[Matched]):
     def __next__(self) -> Matched: ...
     def close(self) -> None:
         """Ends the sequence: stops the running match, consumes no more pairs, and releases the matcher."""
+
+@final
+class Blocks:
+    """A rectified pair in files that is matched block by block, as the program does with --blocks: for pairs that are larger than memory, or
+    shared by several processes or machines. It can be pickled, and opens files and device where it arrives."""
+
+    def __new__(
+        cls,
+        left: _Path,
+        right: _Path,
+        max_disparity: float | None = None,
+        *,
+        min_disparity: float | None = None,
+        mask: _Path | None = None,
+        no_data: float | None = None,
+        orient: bool = False,
+        max_pixels: int | None = None,
+        scratch: _Path | None = None,
+        method: _Path | None = None,
+        options: Mapping[str, Any] | None = None,
+        memory: str | None = None,
+        warn: bool = True,
+        device: str | int | None = None,
+        threads: int | None = None,
+    ) -> Blocks: ...
+    def __len__(self) -> int: ...
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of the whole map, in pixels."""
+    @property
+    def min_disparity(self) -> int:
+        """Smallest disparity to search, in pixels."""
+    @property
+    def max_disparity(self) -> int:
+        """Largest disparity to search, in pixels."""
+    def part(self, index: int) -> tuple[int, int, int, int]:
+        """The part of the left image that a block covers: (x, y, width, height) in pixels."""
+    def match(self, index: int) -> Matched:
+        """Matches a block, and returns the maps of its part, of shape (height, width)."""
+
+@final
+class PairWindows:
+    """A rectified pair in files, of which windows are read, in the memory of a window. It can be pickled, and opens the files again where it
+    arrives."""
+
+    def __new__(
+        cls,
+        left: _Path,
+        right: _Path,
+        mask: _Path | None = None,
+        *,
+        no_data: float | None = None,
+        orient: bool = False,
+        max_pixels: int | None = None,
+        scratch: _Path | None = None,
+    ) -> PairWindows: ...
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of both images, in pixels."""
+    def window(
+        self, x: int, y: int, width: int, height: int
+    ) -> tuple[np.ma.MaskedArray[Any, Any], np.ma.MaskedArray[Any, Any]]:
+        """Reads a part of both images, for `match`: masked arrays of shape (height, width, 3), RGB, uint8 for images of 8 bits, else uint16
+        with the levels of the whole pair."""
 
 @final
 class Calibration:
@@ -371,6 +438,23 @@ def match(
     threads: int | None = None,
 ) -> Matched:
     """Matches a single rectified pair, and returns its maps; help(mrfgs.Matcher) explains every argument."""
+
+def match_many(
+    pairs: Iterable[Sequence[_Image | _Path | Mapping[str, Any] | None]],
+    max_disparity: float | None = None,
+    *,
+    matcher: Matcher | None = None,
+    min_disparity: float | None = None,
+    no_data: float | None = None,
+    orient: bool = False,
+    method: _Path | None = None,
+    options: Mapping[str, Any] | None = None,
+    memory: str | None = None,
+    warn: bool = True,
+) -> Iterator[Matched | Exception]:
+    """Matches pairs of different scenes, of arrays or paths, and returns an iterator that yields a Matched for each, in order, or the exception
+    of a pair that fails in its place. A pair is (left, right) or (left, right, prior). Unlike those of Matcher.match_all, each pair has its
+    own range, warnings and corrections."""
 
 def presets() -> dict[str, str]:
     """Lists the presets: a dict from each name to its purpose."""

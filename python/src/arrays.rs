@@ -262,6 +262,13 @@ pub(crate) struct Stored {
     bytes: bool,
 }
 
+impl Stored {
+    /// Three channels, of 8 bits if `bytes`.
+    pub(crate) fn colours(bytes: bool) -> Self {
+        Self { channels: 3, bytes }
+    }
+}
+
 /// The images of a pair as masked arrays. Images of more than 8 bits are scaled so that `match` reads the same levels from them.
 pub(crate) fn images<'py>(
     py: Python<'py>,

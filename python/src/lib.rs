@@ -1,11 +1,13 @@
 //! The Python module `mrfgs._mrfgs`: arrays in, arrays out, with the crate `mrfgs` in between.
 
 mod arrays;
+mod blocks;
 mod calibration;
 mod depth;
 mod drift;
 mod evaluation;
 mod exceptions;
+mod files;
 mod matched;
 mod matcher;
 mod options;
@@ -34,11 +36,13 @@ fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evaluation::evaluate, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::read_disparity, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::read_image, module)?)?;
+    module.add_class::<blocks::PyBlocks>()?;
     module.add_class::<calibration::PyCalibration>()?;
     module.add_class::<drift::PyDrift>()?;
     module.add_class::<matched::PyMatched>()?;
     module.add_class::<sequence::PyMatchedSequence>()?;
     module.add_class::<matcher::PyMatcher>()?;
+    module.add_class::<files::PyPairWindows>()?;
     module.add_class::<depth::PyPoints>()?;
     module.add_class::<rectification::PyRectification>()?;
     module.add_class::<depth::PyRig>()?;

@@ -2,7 +2,7 @@
 
 use std::process;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 
@@ -33,7 +33,8 @@ use crate::{options, prior, range};
 /// Threads may share a Matcher; their matches take turns. A forked process may use its parent's Matcher on the CPU, but not devices: there
 /// "auto" uses the CPU, as Matched.note says, and "gpu" raises RuntimeError; start processes with "spawn" or "forkserver" instead.
 ///
-/// A Matcher can be pickled, and so sent to workers. It opens the device where it arrives: one for each process, however often it comes.
+/// A Matcher can be pickled, and so sent to workers. Where it arrives, it opens the device for its first match: one for each process, however
+/// often it comes.
 #[pyclass(name = "Matcher", frozen, module = "mrfgs")]
 pub(crate) struct PyMatcher {
     shared: Shared,
@@ -42,7 +43,7 @@ pub(crate) struct PyMatcher {
 }
 
 /// The arguments of a Matcher: its device as a text, and its threads.
-type Recipe = (String, Option<usize>);
+pub(crate) type Recipe = (String, Option<usize>);
 
 /// The Matchers that have arrived by pickle: a dict from the process and the recipe.
 static ARRIVED: PyOnceLock<Py<PyDict>> = PyOnceLock::new();
@@ -61,16 +62,18 @@ impl PyMatcher {
     }
 
     #[staticmethod]
-    fn _arrived<'py>(py: Python<'py>, device: String, threads: Option<usize>) -> PyResult<Bound<'py, PyAny>> {
+    fn _arrived<'py>(py: Python<'py>, device: String, threads: Option<usize>) -> PyResult<Bound<'py, Self>> {
         let arrived = ARRIVED.get_or_init(py, || PyDict::new(py).unbind()).bind(py);
-        let key = (process::id(), device.clone(), threads);
+        let recipe = (device, threads);
+        let key = (process::id(), recipe.clone());
         if let Some(known) = arrived.get_item(&key)? {
-            return Ok(known);
+            return Ok(known.cast_into()?);
         }
-        let execution = Execution { device: (&*device).into(), threads, ..Execution::default() };
-        let opened = Bound::new(py, Self::open(py, execution)?)?;
+        let execution = Execution { device: (&*recipe.0).into(), threads, ..Execution::default() };
+        let matcher = SharedMatcher::unopened(Matcher::builder().execution(execution)).map_err(exception)?;
+        let made = Bound::new(py, Self { shared: Shared::new(matcher), recipe })?;
         // Another thread may have been faster.
-        arrived.call_method1("setdefault", (key, opened))
+        Ok(arrived.call_method1("setdefault", (key, made))?.cast_into()?)
     }
 
     /// Matches a rectified pair, and returns its maps as a Matched.
@@ -218,20 +221,29 @@ impl PyMatcher {
 
 impl PyMatcher {
     fn open(py: Python, execution: Execution) -> PyResult<Self> {
-        let device = match &execution.device {
-            DeviceChoice::Auto => "auto",
-            DeviceChoice::Cpu => "cpu",
-            DeviceChoice::Gpu => "gpu",
-            DeviceChoice::Named(name) => name,
-        };
-        let recipe = (device.to_owned(), execution.threads);
+        let recipe = recipe(&execution);
         let builder = Matcher::builder().execution(execution);
         let matcher = py.detach(|| SharedMatcher::new(builder)).map_err(exception)?;
         // Opening a device takes a while.
         py.check_signals()?;
-        let shared = Shared { matcher: Arc::new(matcher), taken: Arc::new(AtomicU32::new(0)) };
-        Ok(Self { shared, recipe })
+        Ok(Self { shared: Shared::new(matcher), recipe })
     }
+
+    /// The matcher of this process for `recipe`, which opens the device for its first match.
+    pub(crate) fn of_process(py: Python, (device, threads): Recipe) -> PyResult<Shared> {
+        Ok(Self::_arrived(py, device, threads)?.get().shared.clone())
+    }
+}
+
+/// The arguments of a Matcher for `execution`.
+pub(crate) fn recipe(execution: &Execution) -> Recipe {
+    let device = match &execution.device {
+        DeviceChoice::Auto => "auto",
+        DeviceChoice::Cpu => "cpu",
+        DeviceChoice::Gpu => "gpu",
+        DeviceChoice::Named(name) => name,
+    };
+    (device.to_owned(), execution.threads)
 }
 
 /// Matches a single rectified pair, and returns its maps as a Matched.
@@ -295,7 +307,7 @@ fn region(given: &Bound<PyAny>, pair: &Pair, range: DisparityRange) -> PyResult<
 }
 
 /// Runs the match on another thread while this one checks for Ctrl-C, as Python reports that only to its main thread.
-fn interruptible(run: impl FnOnce(&AtomicBool) -> mrfgs::Result<Matched> + Send) -> PyResult<Matched> {
+pub(crate) fn interruptible(run: impl FnOnce(&AtomicBool) -> mrfgs::Result<Matched> + Send) -> PyResult<Matched> {
     let stop = AtomicBool::new(false);
     let (sender, receiver) = mpsc::channel();
     thread::scope(|scope| {

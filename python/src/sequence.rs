@@ -36,6 +36,10 @@ pub(crate) struct Shared {
 }
 
 impl Shared {
+    pub(crate) fn new(matcher: SharedMatcher) -> Self {
+        Self { matcher: Arc::new(matcher), taken: Arc::new(AtomicU32::new(0)) }
+    }
+
     /// Refuses a matcher in the middle of a sequence, which would wait for pairs forever.
     pub(crate) fn check(&self) -> PyResult<()> {
         if self.taken.load(Ordering::Acquire) == process::id() {

@@ -21,16 +21,24 @@ impl SharedMatcher {
     /// # Errors
     /// The errors of [`Builder::build`].
     pub fn new(builder: Builder) -> Result<Self> {
-        let threads = Arc::new(Threads::new(builder.execution.threads)?);
-        let shared = Self { builder, threads, own: PerProcess::new() };
+        let shared = Self::unopened(builder)?;
         shared.turn(|_| Ok(()))?;
         Ok(shared)
+    }
+
+    /// A matcher that opens the device in its first [turn](Self::turn).
+    ///
+    /// # Errors
+    /// [`ExecutionError`](crate::error::ExecutionError) for a number of threads out of range.
+    pub fn unopened(builder: Builder) -> Result<Self> {
+        let threads = Arc::new(Threads::new(builder.execution.threads)?);
+        Ok(Self { builder, threads, own: PerProcess::new() })
     }
 
     /// Runs `work` with the matcher, once no other thread uses it.
     ///
     /// # Errors
-    /// The error of `work`, and in a forked process the errors of [`Builder::build`].
+    /// The error of `work`, and, if it is the first turn in this process, the errors of [`Builder::build`].
     pub fn turn<T>(&self, work: impl FnOnce(&mut Matcher) -> Result<T>) -> Result<T> {
         let mut own = self.own.get().lock().unwrap_or_else(PoisonError::into_inner);
         let matcher = match own.take() {
@@ -45,7 +53,18 @@ impl SharedMatcher {
     /// # Errors
     /// [`ExecutionError`](crate::error::ExecutionError) if the system does not start the threads.
     pub fn share<T: Send>(&self, pair: &Pair, work: impl FnOnce() -> T + Send) -> Result<T> {
-        let (width, height) = pair.size();
+        self.share_of(pair.size(), work)
+    }
+
+    /// Like [`SharedMatcher::share`], for a pair of (width, height) pixels, such as one that `work` reads.
+    ///
+    /// # Errors
+    /// [`ExecutionError`](crate::error::ExecutionError) if the system does not start the threads.
+    pub fn share_of<T: Send>(
+        &self,
+        (width, height): (usize, usize),
+        work: impl FnOnce() -> T + Send,
+    ) -> Result<T> {
         Ok(self.threads.pool(width * height)?.install(work))
     }
 }
