@@ -51,8 +51,8 @@ static ARRIVED: PyOnceLock<Py<PyDict>> = PyOnceLock::new();
 /// that, and opens files and device where it arrives: once for each process, and the device for its first block. So the files must be there
 /// under the same absolute paths, unchanged.
 ///
-/// Raises ValueError for invalid arguments and damaged files, TypeError for arrays, FileNotFoundError if a file does not exist, and
-/// MemoryError if memory is too small for a block.
+/// Raises ValueError for invalid arguments and damaged files, and if `memory` is too small for a block, TypeError for arrays,
+/// FileNotFoundError if a file does not exist, and MemoryError if the machine has too little memory.
 #[pyclass(name = "Blocks", frozen, module = "mrfgs")]
 pub(crate) struct PyBlocks {
     files: PairFiles,

@@ -13,6 +13,7 @@ const WORDS: Vocabulary = Vocabulary {
     fork: "start it with multiprocessing.get_context(\"spawn\") or \"forkserver\", or make no Matcher with a device before the fork",
     memory: Some(["memory", "MiB"]),
     mask: Some("give a mask of everything that is not image"),
+    max_pixels: Some("max_pixels of Blocks or PairWindows,"),
     rectify: Some("rectify it first with Rectification(calibration), or Rectification.of_pair() without one"),
     unit: Some("set the right one with Calibration(..., unit=\"m\") or Rig.of(..., unit=\"m\")"),
     crop: Some("Calibration(..., crop=(x, y, width, height))"),

@@ -1893,6 +1893,225 @@ class Sequences(Folder):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
 
 
+# The maps of a match.
+MAPS = ("disparity", "raw", "confidence", "sigma", "validity")
+
+
+def coarse_pair(height, width, seed=1):
+    """A grey pair whose texture a smaller copy still shows: disparity 8 in the upper half, 16 in the lower."""
+    random = np.random.default_rng(seed)
+    texture = np.kron(random.integers(0, 256, (height // 4 + 1, width // 4 + 10), dtype=np.uint8), np.ones((4, 4), np.uint8))[:height]
+    left, right = texture[:, :width].copy(), np.empty((height, width), np.uint8)
+    for rows, d in ((slice(0, height // 2), 8), (slice(height // 2, height), 16)):
+        right[rows] = texture[rows, d:d + width]
+    return left, right
+
+
+def joined(blocks, matched=None):
+    """The whole maps of all blocks, as a dict."""
+    (width, height), maps = blocks.size, {}
+    for i, found in enumerate(matched or map(blocks.match, range(len(blocks)))):
+        x, y, columns, rows = blocks.part(i)
+        for name in MAPS:
+            part = getattr(found, name)
+            assert part.shape == (rows, columns), name
+            maps.setdefault(name, np.full((height, width), 77, part.dtype))[y:y + rows, x:x + columns] = part
+    return maps
+
+
+class LargePairs(Folder):
+    """Pairs in files that are matched in blocks."""
+
+    KEYWORDS = {"method": "fast", "memory": "32MiB", "device": "cpu"}
+    FLAGS = ("--method", "fast", "--memory", "32MiB", "--device", "cpu")
+
+    def setUp(self):
+        super().setUp()
+        self.write_pair("", *coarse_pair(520, 700))
+        self.paths = [self.folder / "left.ppm", self.folder / "right.ppm"]
+
+    def write_pair(self, before, left, right):
+        write_ppm(self.folder / f"{before}left.ppm", left)
+        write_ppm(self.folder / f"{before}right.ppm", right)
+
+    def check(self, blocks, views, *flags):
+        """Compares the joined blocks with the maps of the program."""
+        self.assertGreater(len(blocks), 2)
+        program(self.folder, "match", *views, "map.pfm", *self.FLAGS, *flags, "--quiet", "--blocks", f"job{views[0]}",
+                "--also", "raw,confidence,sigma,validity")
+        maps = joined(blocks)
+        self.assertEqual(maps["disparity"].tobytes(), read_pfm(self.folder / "map.pfm").tobytes())
+        for name in ("raw", "sigma"):
+            self.assertEqual(maps[name].tobytes(), read_pfm(self.folder / f"map.{name}.pfm").tobytes(), name)
+        for name in ("confidence", "validity"):
+            self.assertEqual(maps[name].tobytes(), read_png(self.folder / f"map.{name}.png").tobytes(), name)
+
+    def test_blocks_have_the_bytes_of_the_program(self):
+        blocks = mrfgs.Blocks(*self.paths, 31, **self.KEYWORDS)
+        self.check(blocks, ("left.ppm", "right.ppm"), "--max-disparity", 31)
+        self.assertEqual((blocks.size, blocks.min_disparity, blocks.max_disparity), ((700, 520), 0, 31))
+        self.assertIn(f"{len(blocks)} of 700 x 520, disparities 0 to 31", repr(blocks))
+        self.assertEqual(sum(width * height for _, _, width, height in map(blocks.part, range(len(blocks)))), 700 * 520)
+        # Of 16 bits, whose levels depend on the whole pair, which has to be corrected; with a mask, a value for no data, and without a range.
+        left, right = coarse_pair(520, 700, seed=2)
+        left, right = left.astype(np.uint16) * 9 + 3, np.roll(right, 1, axis=0).astype(np.uint16) * 9 + 3
+        left[:100], right[:100] = left[:100] // 8, right[:100] // 8
+        left[200:220, 300:310] = 0
+        self.write_pair("16", left, right)
+        mask = np.zeros((520, 700), np.uint8)
+        mask[400:450, 20:300] = 255
+        write_ppm(self.folder / "mask.ppm", mask)
+        blocks = mrfgs.Blocks(self.folder / "16left.ppm", self.folder / "16right.ppm", min_disparity=-2, mask=self.folder / "mask.ppm", no_data=0,
+                              warn=False, **self.KEYWORDS)
+        self.check(pickle.loads(pickle.dumps(blocks)), ("16left.ppm", "16right.ppm"), "--min-disparity", -2, "--mask", "mask.ppm", "--no-data", 0)
+
+    def test_blocks_open_where_they_arrive(self):
+        here = os.getcwd()
+        os.chdir(self.folder)
+        try:
+            blocks = mrfgs.Blocks("left.ppm", "right.ppm", 15, threads=1, **self.KEYWORDS)
+        finally:
+            os.chdir(here)
+        again = pickle.loads(pickle.dumps(blocks))
+        self.assertIsNot(again, blocks)
+        self.assertIs(pickle.loads(pickle.dumps(again)), again, "one for each process")
+        self.assertIs(copy.copy(again), again)
+        other = mrfgs.Blocks(*self.paths, 16, threads=1, **self.KEYWORDS)
+        self.assertEqual(pickle.loads(pickle.dumps(other)).max_disparity, 16)
+        expected = joined(blocks)
+        for way in multiprocessing.get_all_start_methods():
+            with multiprocessing.get_context(way).Pool(2) as pool:
+                found = joined(blocks, pool.map_async(blocks.match, range(len(blocks)), chunksize=1).get(timeout=240))
+            self.assertTrue(all(np.array_equal(found[name], expected[name]) for name in MAPS), way)
+        with multiprocessing.pool.ThreadPool(4) as pool:
+            found = joined(blocks, pool.map_async(pickle.loads(pickle.dumps(blocks)).match, range(len(blocks))).get(timeout=240))
+        self.assertTrue(all(np.array_equal(found[name], expected[name]) for name in MAPS))
+
+    def test_what_has_changed_is_refused(self):
+        blocks = mrfgs.Blocks(*self.paths, 15, **self.KEYWORDS)
+        pickled = pickle.dumps(blocks)
+        expected = blocks.match(0).disparity
+        make, state = blocks.__reduce__()
+        self.refused(RuntimeError, "these blocks come from mrfgs 0.0.1", lambda: make("0.0.1", *state[1:]))
+        with open(self.paths[1], "ab") as file:
+            file.write(b"more")
+        self.refused(ValueError, "right.ppm has changed since it was first opened; start again", lambda: pickle.loads(pickled).match(0))
+        # An error does not stay.
+        os.truncate(self.paths[1], os.path.getsize(self.paths[1]) - 4)
+        self.assertTrue(np.array_equal(pickle.loads(pickled).match(0).disparity, expected))
+        self.paths[1].unlink()
+        pickled = pickle.dumps(mrfgs.PairWindows(self.paths[0], self.paths[0]))
+        self.paths[0].unlink()
+        self.refused(FileNotFoundError, "left.ppm: ", lambda: pickle.loads(pickled).window(0, 0, 9, 9))
+
+    def test_windows_are_what_match_takes(self):
+        windows = mrfgs.PairWindows(*map(str, self.paths))
+        self.assertEqual((windows.size, repr(windows)), ((700, 520), "<mrfgs.PairWindows: 700 x 520>"))
+        whole = [mrfgs.read_image(path) for path in self.paths]
+        parts = windows.window(100, 50, 300, 200)
+        for part, image in zip(parts, whole):
+            self.assertEqual((part.shape, part.dtype, part.mask.any()), ((200, 300, 3), np.uint8, False))
+            self.assertTrue(all(np.array_equal(part[..., i], image[50:250, 100:400]) for i in range(3)))
+        expected = mrfgs.match(*(image[50:250, 100:400] for image in whole), 15, device="cpu")
+        again = pickle.loads(pickle.dumps(windows))
+        self.assertIs(pickle.loads(pickle.dumps(again)), again)
+        found = mrfgs.match(*again.window(100, 50, 300, 200), 15, device="cpu")
+        self.assertTrue(np.array_equal(found.disparity, expected.disparity))
+        # The levels of 16 bits are those of the whole pair: 9 bits here, in all windows.
+        left, right = coarse_pair(80, 100)
+        left, right = (np.where(np.arange(100) < 50, view // 4, view.astype(np.uint16) * 2) for view in (left, right))
+        left[3, 4] = 9999
+        self.write_pair("16", left.astype(np.uint16), right.astype(np.uint16))
+        windows = mrfgs.PairWindows(self.folder / "16left.ppm", self.folder / "16right.ppm", no_data=9999)
+        whole = windows.window(0, 0, 100, 80)[0]
+        self.assertEqual((whole.dtype, whole.mask[3, 4].all(), whole.mask.sum()), (np.uint16, True, 3))
+        self.assertTrue(np.array_equal(np.delete(whole[..., 0].data, 3, 0), np.delete(left.astype(np.uint16) * 128, 3, 0)))
+        self.assertTrue(np.array_equal(windows.window(10, 20, 30, 40)[0], whole[20:60, 10:40]))
+
+    def test_what_makes_no_sense_is_an_exception(self):
+        left, right = self.paths
+        views = [mrfgs.read_image(path) for path in self.paths]
+        blocks, windows = mrfgs.Blocks(left, right, 15, **self.KEYWORDS), mrfgs.PairWindows(left, right)
+        write_ppm(self.folder / "small.ppm", np.zeros((7, 7), np.uint8))
+        small, count = self.folder / "small.ppm", len(blocks)
+        for error, words, call in (
+            (TypeError, "left: give the path of a file; arrays are matched by mrfgs.match", lambda: mrfgs.Blocks(*views, 15)),
+            (TypeError, "mask: give the path of a file", lambda: mrfgs.PairWindows(left, right, views[0])),
+            (FileNotFoundError, "nowhere.png: ", lambda: mrfgs.Blocks(left, "nowhere.png", 15)),
+            (ValueError, "the same size", lambda: mrfgs.Blocks(left, small, 15)),
+            (ValueError, "small.ppm", lambda: mrfgs.PairWindows(left, right, small)),
+            (ValueError, "neither a preset nor a file", lambda: mrfgs.Blocks(left, right, 15, method="best")),
+            (ValueError, "max_disparity: give a whole number", lambda: mrfgs.Blocks(left, right, 15.5)),
+            (ValueError, "threads", lambda: mrfgs.Blocks(left, right, 15, threads=0)),
+            (ValueError, "memory: 1 MiB", lambda: mrfgs.Blocks(left, right, 15, memory="1MiB")),
+            (ValueError, "if it really is that large, raise max_pixels of Blocks or PairWindows, or crop it", lambda: mrfgs.Blocks(left, right, 15, max_pixels=1000)),
+            (IndexError, f"block {count}: give one of the {count} blocks, 0 to {count - 1}", lambda: blocks.match(count)),
+            (IndexError, f"block 99: give one of the {count} blocks", lambda: blocks.part(99)),
+            (ValueError, "a pair of 700 x 520", lambda: windows.window(600, 0, 101, 5)),
+            (ValueError, "a pair of 700 x 520", lambda: windows.window(600, 0, 5, 0)),
+        ):
+            with self.subTest(words):
+                self.refused(error, words, call)
+        # A device that does not exist is missed by the first match alone, as only the machines that match need one.
+        blocks = mrfgs.Blocks(left, right, 15, **{**self.KEYWORDS, "device": "no such device"})
+        self.refused(ValueError, "device: no ", lambda: blocks.match(0))
+
+    def test_probable_faults_are_warnings(self):
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            mrfgs.Blocks(*self.paths[::-1], 15, **self.KEYWORDS)
+        self.assertIn("swapped", str(told[0].message))
+        self.assertIs(told[0].category, mrfgs.MatchWarning)
+
+
+class ManyPairs(Folder):
+    def test_each_pair_is_matched_by_itself(self):
+        views = [pair(), pair(80, 120, seed=2), pair(seed=3)]
+        paths = [self.folder / "left.ppm", str(self.folder / "right.ppm")]
+        for path, view in zip(paths, views[1]):
+            write_ppm(Path(path), view)
+        damaged = self.write("damaged.png", "no image")
+        matcher = mrfgs.Matcher(device="cpu")
+        prior = np.array([[40.0, 10.0, 4.0]])
+        wanted = [views[0], paths, (paths[0], views[1][1]), (paths[0], damaged), (*views[2], prior), (*views[2], {"prior": prior, "prior_sigma": 0.5}),
+                  (views[0][0], views[1][1]), 5, "ab", ("nowhere.png", paths[1]), (*views[2], {"sigma": 1}), [*views[2], None]]
+        found = list(mrfgs.match_many(iter(wanted), 15, matcher=matcher, method="fast", warn=False))
+        self.assertEqual(len(found), len(wanted))
+        arguments = {"method": "fast", "warn": False}
+        expected = [matcher.match(*both, 15, **arguments, **more) for both, more in (
+            (views[0], {}), (views[1], {}), (views[1], {}), (views[2], {"prior": prior}), (views[2], {"prior": prior, "prior_sigma": 0.5}), (views[2], {}))]
+        for i, other in zip((0, 1, 2, 4, 5, 11), expected):
+            self.assertTrue(np.array_equal(found[i].disparity, other.disparity), i)
+        for i, (error, words) in {3: (ValueError, "damaged.png"), 6: (ValueError, "the same size"), 7: (TypeError, "give two arrays or paths"),
+                                  8: (TypeError, "give two arrays or paths"), 9: (FileNotFoundError, "nowhere.png"),
+                                  10: (TypeError, "prior: 'sigma' is none of prior, prior_sigma, prior_kind")}.items():
+            self.assertIs(type(found[i]), error, i)
+            self.assertIn(words, str(found[i]))
+            self.assertIsNone(found[i].__traceback__)
+            self.assertIs(type(pickle.loads(pickle.dumps(found[i]))), error)
+        # Each has a range of its own.
+        one, two = mrfgs.match_many([pair(200, 300), [np.roll(view, 3 * i, 1) for i, view in enumerate(pair(200, 300))]], matcher=matcher)
+        self.assertNotEqual(one.min_disparity, two.min_disparity)
+
+    def test_what_no_pair_could_mend_is_raised(self):
+        matcher = mrfgs.Matcher(device="cpu")
+        for error, words, call in (
+            (ValueError, "neither a preset nor a file", lambda: mrfgs.match_many([], 15, matcher=matcher, method="best")),
+            (ValueError, "max_disparity: give a whole number", lambda: mrfgs.match_many([], 1.5, matcher=matcher)),
+            (TypeError, "matcher: give a mrfgs.Matcher, not str", lambda: mrfgs.match_many([], 15, matcher="cpu")),
+            (TypeError, "pairs: give an iterable of pairs of arrays or paths", lambda: mrfgs.match_many(5, 15, matcher=matcher)),
+        ):
+            self.refused(error, words, call)
+
+        def broken():
+            yield pair()
+            raise KeyError("camera")
+
+        results = mrfgs.match_many(broken(), 15, matcher=matcher)
+        self.assertIsInstance(next(results), mrfgs.Matched)
+        self.assertRaises(KeyError, next, results)
+
+
 def digest(*things):
     """A checksum of all arrays and texts."""
     found = 0
@@ -2087,6 +2306,60 @@ class Processes(unittest.TestCase):
         # Control: additional threads are counted.
         self.apart(code % 3, "3 3 3")
 
+    @unittest.skipUnless(Path("/proc/self/task").is_dir(), "Linux alone counts threads so")
+    def test_copies_share_their_threads(self):
+        self.apart("""
+            def alive():
+                return len(os.listdir("/proc/self/task"))
+
+            folder = Path(tempfile.mkdtemp())
+            views, before = coarse_pair(520, 700), alive()
+            for name, view in zip(("left.ppm", "right.ppm"), views):
+                write_ppm(folder / name, view)
+            files = folder / "left.ppm", folder / "right.ppm"
+            blocks = mrfgs.Blocks(*files, 15, method="fast", memory="32MiB", device="cpu", threads=2)
+            pickled = pickle.dumps([mrfgs.Matcher(device="cpu", threads=2), blocks])
+            copies = [pickle.loads(pickled) for _ in range(300)]
+            counts, expected = [alive() - before], digest(copies[0][0].match(*views, 15).disparity)
+            with multiprocessing.pool.ThreadPool(4) as pool:
+                same = set(pool.map(lambda copy: digest(copy[0].match(*views, 15, method="fast").disparity), copies[:20]))
+                pool.map(lambda copy: copy[1].match(1), copies[:20])
+            time.sleep(0.5)
+            counts.append(alive() - before)
+            # Control: other settings take threads of their own.
+            matcher = pickle.loads(pickle.dumps(mrfgs.Matcher(device="cpu", threads=1)))
+            matcher.match(*views, 15)
+            counts.append(alive() - before)
+            print(*counts, len(same), len({id(copy[1]) for copy in copies}))
+        """, "2 2 3 1 1")
+
+    def test_a_child_matches_the_blocks_of_its_parent(self):
+        self.apart("""
+            folder = Path(tempfile.mkdtemp())
+            files = folder / "left.ppm", folder / "right.ppm"
+            for file, view in zip(files, coarse_pair(520, 700)):
+                write_ppm(file, view)
+            blocks = mrfgs.Blocks(*files, 15, method="fast", memory="32MiB", device="cpu")
+            pickled, done = pickle.dumps(blocks), threading.Event()
+            same = [forked(lambda: digest(blocks.match(0).disparity))]
+            expected = digest(blocks.match(0).disparity)
+
+            def busy():
+                while not done.is_set():
+                    blocks.match(1)
+                    pickle.loads(pickled).match(2)
+
+            threads = [threading.Thread(target=busy) for _ in range(2)]
+            for thread in threads:
+                thread.start()
+            for _ in range(6):
+                time.sleep(0.03)
+                same.append(forked(lambda: digest(blocks.match(0).disparity)))
+                same.append(forked(lambda: digest(pickle.loads(pickled).match(0).disparity)))
+            done.set()
+            print({one == expected for one in same}, len(same))
+        """, "{True} 13")
+
     def test_the_environment_says_how_many_threads_are_usual(self):
         code = "print(mrfgs.match(*pair(200, 300), 15, device='cpu').ran_on)"
         one, names = "the CPU path, 1 thread", ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK", "SLURM_CPUS_ON_NODE")
@@ -2122,7 +2395,9 @@ class Help(unittest.TestCase):
         for thing, more in ((mrfgs.Calibration, None), (mrfgs.Calibration.of_texts, mrfgs.Calibration), (mrfgs.Rectification, None),
                             (mrfgs.Rectification.apply, None), (mrfgs.Rig, None), (mrfgs.Rig.depth, None), (mrfgs.Rig.millimetres, None),
                             (mrfgs.Rig.points, None), (mrfgs.Rig.seen, None), (mrfgs.Points, None), (mrfgs.Points.save, None), (mrfgs.evaluate, None),
-                            (mrfgs.Matcher.match_all, mrfgs.Matcher.match)):
+                            (mrfgs.Matcher.match_all, mrfgs.Matcher.match), (mrfgs.Blocks, None), (mrfgs.Blocks.match, None),
+                            (mrfgs.Blocks.part, None), (mrfgs.PairWindows, None), (mrfgs.PairWindows.window, None),
+                            (mrfgs.match_many, mrfgs.Matcher.match)):
             text = inspect.getdoc(thing) + (inspect.getdoc(more) if more else "")
             for name in parameters(thing):
                 self.assertTrue(name == "self" or name in text, f"{thing}: {name}")
