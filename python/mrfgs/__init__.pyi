@@ -156,8 +156,8 @@ class MatchedSequence(Iterator[Matched]):
 
 @final
 class Blocks:
-    """A rectified pair in files that is matched block by block, as the program does with --blocks: for pairs that are larger than memory, or
-    shared by several processes or machines. It can be pickled, and opens files and device where it arrives."""
+    """A rectified pair in files that is matched block by block, as the program does with --blocks: for pairs that are larger than memory,
+    or shared by several processes or machines. It can be pickled, and opens files and device where it arrives."""
 
     def __new__(
         cls,
@@ -195,8 +195,8 @@ class Blocks:
 
 @final
 class PairWindows:
-    """A rectified pair in files, of which windows are read, in the memory of a window. It can be pickled, and opens the files again where it
-    arrives."""
+    """A rectified pair in files, of which windows are read, in the memory of a window. It can be pickled, and opens the files again where
+    it arrives."""
 
     def __new__(
         cls,
@@ -452,9 +452,9 @@ def match_many(
     memory: str | None = None,
     warn: bool = True,
 ) -> Iterator[Matched | Exception]:
-    """Matches pairs of different scenes, of arrays or paths, and returns an iterator that yields a Matched for each, in order, or the exception
-    of a pair that fails in its place. A pair is (left, right) or (left, right, prior). Unlike those of Matcher.match_all, each pair has its
-    own range, warnings and corrections."""
+    """Matches pairs of different scenes, of arrays or paths, and returns an iterator that yields a Matched for each, in order, or the
+    exception of a pair that fails in its place. A pair is (left, right) or (left, right, prior). Unlike those of Matcher.match_all, each
+    pair has its own range, warnings and corrections."""
 
 def presets() -> dict[str, str]:
     """Lists the presets: a dict from each name to its purpose."""

@@ -1,11 +1,11 @@
 //! Large pairs in blocks.
 
+use mrfgs::Conditioning;
 use mrfgs::check::{self, Warning};
 use mrfgs::image::Rect;
 use mrfgs::image::windows::{Overview, PairWindows};
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::region::{Blocks, Region};
-use mrfgs::Conditioning;
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -26,6 +26,9 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// How the blocks are matched: the range, the method in TOML, the corrections (row offset, smoothing of both views), and the matcher.
 type MatchState = ((i32, i32), String, (i32, f64, f64), Recipe);
 
+/// A pickle: the version, the files, and how the blocks are matched.
+type State = (String, FilesState, MatchState);
+
 /// The blocks that have arrived by pickle.
 static ARRIVED: PyOnceLock<Py<PyDict>> = PyOnceLock::new();
 
@@ -35,9 +38,10 @@ static ARRIVED: PyOnceLock<Py<PyDict>> = PyOnceLock::new();
 /// len(blocks) is the number of blocks. Their parts cover the left image, each pixel once; joined, their maps have the same bytes as those
 /// of `mrfgs match --blocks` with the same arguments, on every device and in any order.
 ///
-/// left, right: the files, of any kind that `read_image` reads. Of TIFF files, only the strips and tiles of a block are decoded. Other files
-///     are unpacked once for each process: into memory, or into a file in `scratch` above 64 MiB.
-/// max_disparity, min_disparity: the range to search, as for `Matcher.match`. Without max_disparity it is found in a smaller copy of the pair.
+/// left, right: the files, of any kind that `read_image` reads. Of TIFF files, only the strips and tiles of a block are decoded. Other
+///     files are unpacked once for each process: into memory, or into a file in `scratch` above 64 MiB.
+/// max_disparity, min_disparity: the range to search, as for `Matcher.match`. Without max_disparity it is found in a smaller copy of the
+///     pair.
 /// mask: the file of a mask: pixels of the left image where it is not black are ignored.
 /// no_data: a value for no data: pixels that have it in every channel are ignored, in both images.
 /// orient: whether to rotate both upright according to their EXIF or TIFF orientation tag.
@@ -92,7 +96,8 @@ impl PyBlocks {
         let matcher = PyMatcher::of_process(py, recipe.clone())?.matcher;
         let min = range::pixels("min_disparity", min_disparity)?;
         let given = range::given(range::pixels("max_disparity", max_disparity)?, min)?;
-        let files = PairFiles::new(&FilesGiven { views: [left, right], mask, no_data, orient, max_pixels, scratch })?;
+        let files =
+            PairFiles::new(&FilesGiven { views: [left, right], mask, no_data, orient, max_pixels, scratch })?;
         // Refuses too little memory before the files are read.
         if let Some(range) = given {
             Blocks::new(files.size(), range, &method).map_err(exception)?;
@@ -109,17 +114,17 @@ impl PyBlocks {
     }
 
     /// Supports `pickle` and `copy`.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (&'static str, FilesState, MatchState))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, State)> {
         let Conditioning { offset, smoothing: [left, right], .. } = self.conditioning;
         let range = (self.range.min, self.range.max);
         let state = (range, self.method.table().to_string(), (offset, left, right), self.recipe.clone());
-        Ok((py.get_type::<Self>().getattr("_arrived")?, (VERSION, self.files.state(), state)))
+        Ok((py.get_type::<Self>().getattr("_arrived")?, (VERSION.to_owned(), self.files.state(), state)))
     }
 
     #[staticmethod]
     #[pyo3(signature = (*state))]
     fn _arrived<'py>(py: Python<'py>, state: Bound<'py, PyTuple>) -> PyResult<Bound<'py, Self>> {
-        let (version, files, matching): (String, FilesState, MatchState) = state.extract()?;
+        let (version, files, matching): State = state.extract()?;
         if version != VERSION {
             return Err(PyRuntimeError::new_err(format!(
                 "these blocks come from mrfgs {version}, and this is {VERSION}, whose maps may differ; install the same version everywhere"
@@ -128,7 +133,8 @@ impl PyBlocks {
         files::arrived(&ARRIVED, state, || {
             let ((min, max), method, (offset, left, right), recipe) = matching;
             let method = method.parse::<toml::Table>().and_then(toml::Table::try_into::<Method>);
-            let method = method.map_err(|error| PyTypeError::new_err(format!("these blocks are damaged: {error}")))?;
+            let method =
+                method.map_err(|error| PyTypeError::new_err(format!("these blocks are damaged: {error}")))?;
             let range = DisparityRange { min, max };
             let files = PairFiles::of_state(files);
             let blocks = Blocks::new(files.size(), range, &method).map_err(exception)?;
@@ -207,7 +213,10 @@ impl PyBlocks {
         let list = self.blocks.list();
         list.get(index).ok_or_else(|| {
             let count = list.len();
-            PyIndexError::new_err(format!("block {index}: give one of the {count} blocks, 0 to {}", count - 1))
+            PyIndexError::new_err(format!(
+                "block {index}: give one of the {count} blocks, 0 to {}",
+                count - 1
+            ))
         })
     }
 }
@@ -238,7 +247,8 @@ impl Common {
             (None, Some(overview)) => found_range(overview, min)?,
             (given, _) => given.expect("without a range there is an overview"),
         };
-        let warnings = overview.filter(|_| warn).map(|overview| warnings(&overview, given)).unwrap_or_default();
+        let warnings =
+            overview.filter(|_| warn).map(|overview| warnings(&overview, given)).unwrap_or_default();
         let blocks = Blocks::new(windows.size(), range, method)?;
         let measure = |part: &Rect| Conditioning::measured(&windows.window(part)?, range, method);
         let measured = blocks.samples().iter().map(measure).collect::<mrfgs::Result<Vec<_>>>()?;

@@ -58,7 +58,8 @@ pub(crate) struct FilesGiven<'a, 'py> {
 impl PairFiles {
     /// Notes the files; they are opened on first use.
     pub(crate) fn new(given: &FilesGiven) -> PyResult<Self> {
-        let [left, right] = [("left", given.views[0]), ("right", given.views[1])].map(|(name, view)| absolute(name, view));
+        let [left, right] =
+            [("left", given.views[0]), ("right", given.views[1])].map(|(name, view)| absolute(name, view));
         let (left, right) = (left?, right?);
         let mask = given.mask.map(|mask| absolute("mask", mask)).transpose()?;
         let scratch = given.scratch.map(|scratch| absolute("scratch", scratch)).transpose()?;
@@ -80,7 +81,11 @@ impl PairFiles {
     pub(crate) fn state(&self) -> FilesState {
         let Reader { no_data, orient, max_pixels } = self.reader;
         let [left, right] = self.paths.clone();
-        ((left, right, self.mask.clone(), no_data, orient, max_pixels, self.scratch.clone()), self.lengths, self.size)
+        (
+            (left, right, self.mask.clone(), no_data, orient, max_pixels, self.scratch.clone()),
+            self.lengths,
+            self.size,
+        )
     }
 
     /// (width, height) of both images in pixels.
@@ -100,7 +105,9 @@ impl PairFiles {
     /// Opens the files.
     fn open(&self) -> mrfgs::Result<PairWindows> {
         let views = self.paths.iter().map(PathBuf::as_path).zip([self.lengths.0, self.lengths.1]);
-        let changed = |path: &Path| Error::Mismatch(format!("{} has changed since it was first opened; start again", path.display()));
+        let changed = |path: &Path| {
+            Error::Mismatch(format!("{} has changed since it was first opened; start again", path.display()))
+        };
         for (path, bytes) in views.chain(self.mask.as_deref().zip(self.lengths.2)) {
             if length(path)? != bytes {
                 return Err(changed(path));
@@ -120,8 +127,8 @@ pub(crate) struct OpenFiles<'a> {
 }
 
 impl OpenFiles<'_> {
-    /// The windows of the pair, opened by the first thread that asks, on the threads of `matcher` if there is one. The calling thread is none
-    /// of those: it could wait for itself.
+    /// The windows of the pair, opened by the first thread that asks, on the threads of `matcher` if there is one. The calling thread must
+    /// be none of those: it could wait for itself.
     ///
     /// # Errors
     /// Those of [`Reader::windows`], and about files that have changed.
@@ -195,8 +202,8 @@ static ARRIVED: PyOnceLock<Py<PyDict>> = PyOnceLock::new();
 /// max_pixels: the most pixels that an image may have, 268 million by default.
 /// scratch: the folder for unpacked files, by default the system's folder for temporary files where the pair is opened.
 ///
-/// It can be pickled, and opens the files again where it arrives: once for each process. Raises ValueError if the images do not fit together
-/// or are damaged, and FileNotFoundError if one does not exist.
+/// It can be pickled, and opens the files again where it arrives: once for each process. Raises ValueError if the images do not fit
+/// together or are damaged, and FileNotFoundError if one does not exist.
 #[pyclass(name = "PairWindows", frozen, module = "mrfgs")]
 pub(crate) struct PyPairWindows(PairFiles);
 
@@ -215,7 +222,8 @@ impl PyPairWindows {
         max_pixels: Option<u64>,
         scratch: Option<&Bound<PyAny>>,
     ) -> PyResult<Self> {
-        let files = PairFiles::new(&FilesGiven { views: [left, right], mask, no_data, orient, max_pixels, scratch })?;
+        let files =
+            PairFiles::new(&FilesGiven { views: [left, right], mask, no_data, orient, max_pixels, scratch })?;
         let opened = files.opened(py);
         py.detach(|| opened.windows(None)).map_err(exception)?;
         py.check_signals()?;
@@ -244,8 +252,8 @@ impl PyPairWindows {
     ///
     /// x, y, width, height: first column, first row and size of the part in pixels.
     ///
-    /// Returns (left, right), masked arrays of shape (height, width, 3), RGB: uint8 for images of 8 bits, else uint16 with the levels of the
-    /// whole pair, so that windows of it look alike. Raises ValueError if the part is not inside the images or a file is damaged there.
+    /// Returns (left, right), masked arrays of shape (height, width, 3), RGB: uint8 for images of 8 bits, else uint16 with the levels of
+    /// the whole pair, so that windows of it look alike. Raises ValueError if the part is not inside the images or a file is damaged there.
     fn window<'py>(
         &self,
         py: Python<'py>,

@@ -33,8 +33,8 @@ use crate::{options, prior, range};
 /// Threads may share a Matcher; their matches take turns. A forked process may use its parent's Matcher on the CPU, but not devices: there
 /// "auto" uses the CPU, as Matched.note says, and "gpu" raises RuntimeError; start processes with "spawn" or "forkserver" instead.
 ///
-/// A Matcher can be pickled, and so sent to workers. Where it arrives, it opens the device for its first match: one for each process, however
-/// often it comes.
+/// A Matcher can be pickled, and so sent to workers. Where it arrives, it opens the device for its first match: one for each process,
+/// however often it comes.
 #[pyclass(name = "Matcher", frozen, module = "mrfgs")]
 pub(crate) struct PyMatcher {
     shared: Shared,
@@ -307,7 +307,9 @@ fn region(given: &Bound<PyAny>, pair: &Pair, range: DisparityRange) -> PyResult<
 }
 
 /// Runs the match on another thread while this one checks for Ctrl-C, as Python reports that only to its main thread.
-pub(crate) fn interruptible(run: impl FnOnce(&AtomicBool) -> mrfgs::Result<Matched> + Send) -> PyResult<Matched> {
+pub(crate) fn interruptible(
+    run: impl FnOnce(&AtomicBool) -> mrfgs::Result<Matched> + Send,
+) -> PyResult<Matched> {
     let stop = AtomicBool::new(false);
     let (sender, receiver) = mpsc::channel();
     thread::scope(|scope| {

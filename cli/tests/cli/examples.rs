@@ -26,6 +26,14 @@ const NOT_RUN: &[(&str, &str)] = &[
         "Python; its tests try it",
     ),
     ("matcher = mrfgs.Matcher(device=\"cpu\", threads=1)", "Python; its tests try it"),
+    (
+        "blocks = mrfgs.Blocks(\"left.tif\", \"right.tif\", 75, memory=\"1GiB\", device=\"cpu\", threads=2)",
+        "Python; its tests and scripts/engines try it",
+    ),
+    (
+        "for (left, right), found in zip(pairs, mrfgs.match_many(pairs, 63, matcher=matcher)):           # pairs of paths or arrays",
+        "Python; its tests and scripts/engines try it",
+    ),
     // These need other programs.
     (
         "ffmpeg -i stereo.mkv -pix_fmt yuv444p -f yuv4mpegpipe - | mrfgs sequence - - --method fast --max-disparity 63 | ffplay -",
