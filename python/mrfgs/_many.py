@@ -24,7 +24,7 @@ def match_many(
     pairs: an iterable of pairs (left, right); each view is an array as for `Matcher.match`, or the path of an image as for `read_image`. A
         third item is the prior of the pair: an array as for `Matcher.match`, None, or a dict with its arguments `prior`, `prior_sigma` and
         `prior_kind`.
-    matcher: the Matcher to use, by default a new one. The others in a process can use it at the same time.
+    matcher: the Matcher to use, by default a new one. Between its matches, others may use it.
     orient: whether to rotate images from files upright according to their EXIF or TIFF orientation tag.
 
     The other arguments are those of `Matcher.match`, for all pairs. Each pair is treated as by that: it has its own range and warnings, and
