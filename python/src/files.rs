@@ -151,10 +151,14 @@ fn nothing() -> Opened {
     Arc::new(Own::new(Mutex::new(None)))
 }
 
-/// Number of bytes of a file.
+/// Number of bytes of a file, which is no pipe, as it is read several times.
 fn length(path: &Path) -> mrfgs::Result<u64> {
     let found = fs::metadata(path).map_err(|e| Error::read(path, e))?;
-    Ok(found.len())
+    if found.is_file() {
+        Ok(found.len())
+    } else {
+        Err(Error::read(path, "it is a folder or a pipe; give a file"))
+    }
 }
 
 /// The argument `name` as an absolute path.

@@ -2041,6 +2041,7 @@ class LargePairs(Folder):
             (TypeError, "left: give the path of a file; arrays are matched by mrfgs.match", lambda: mrfgs.Blocks(*views, 15)),
             (TypeError, "mask: give the path of a file", lambda: mrfgs.PairWindows(left, right, views[0])),
             (FileNotFoundError, "nowhere.png: ", lambda: mrfgs.Blocks(left, "nowhere.png", 15)),
+            (ValueError, "it is a folder or a pipe; give a file", lambda: mrfgs.Blocks(left, self.folder, 15)),
             (ValueError, "the same size", lambda: mrfgs.Blocks(left, small, 15)),
             (ValueError, "small.ppm", lambda: mrfgs.PairWindows(left, right, small)),
             (ValueError, "neither a preset nor a file", lambda: mrfgs.Blocks(left, right, 15, method="best")),
