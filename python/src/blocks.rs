@@ -3,7 +3,7 @@
 use mrfgs::Conditioning;
 use mrfgs::check::{self, Warning};
 use mrfgs::image::Rect;
-use mrfgs::image::windows::{Overview, PairWindows};
+use mrfgs::image::windows::PairWindows;
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::region::{Blocks, Region};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyTypeError};
@@ -16,9 +16,6 @@ use crate::files::{self, FilesGiven, FilesState, PairFiles};
 use crate::matched::PyMatched;
 use crate::matcher::{PyMatcher, Recipe, interruptible, recipe};
 use crate::{options, range};
-
-/// Bytes that sparse matches and warnings take for each pixel of an overview.
-const BYTES: u64 = 128;
 
 /// The version of the package, which determines the maps.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -238,43 +235,18 @@ impl Common {
         method: &Method,
         warn: bool,
     ) -> mrfgs::Result<Self> {
-        let overview = || {
-            let most = (u64::from(method.tiles.memory) << 20) / BYTES;
-            windows.overview(usize::try_from(most).unwrap_or(usize::MAX))
-        };
-        let overview = (warn || given.is_none()).then(overview).transpose()?;
+        let overview = (warn || given.is_none()).then(|| check::overview(windows, method)).transpose()?;
         let range = match (given, &overview) {
-            (None, Some(overview)) => found_range(overview, min)?,
+            (None, Some(overview)) => {
+                let found = check::range_of_overview(overview, None)?;
+                DisparityRange::new(min.unwrap_or(found.min), found.max)?
+            }
             (given, _) => given.expect("without a range there is an overview"),
         };
         let warnings =
-            overview.filter(|_| warn).map(|overview| warnings(&overview, given)).unwrap_or_default();
+            overview.filter(|_| warn).map(|overview| check::warnings_of_overview(&overview, given));
         let blocks = Blocks::new(windows.size(), range, method)?;
-        let measure = |part: &Rect| Conditioning::measured(&windows.window(part)?, range, method);
-        let measured = blocks.samples().iter().map(measure).collect::<mrfgs::Result<Vec<_>>>()?;
-        Ok(Self { range, blocks, conditioning: Conditioning::median(&measured), warnings })
+        let conditioning = blocks.conditioning(|part| windows.window(part))?;
+        Ok(Self { range, blocks, conditioning, warnings: warnings.unwrap_or_default() })
     }
-}
-
-/// The range by sparse matches of an overview, in pixels of the whole pair, starting at `min` if given.
-fn found_range(Overview { pair, factor }: &Overview, min: Option<i32>) -> mrfgs::Result<DisparityRange> {
-    let found = check::range(pair)?;
-    let scaled = |end: i32| i32::try_from(*factor).unwrap_or(i32::MAX).saturating_mul(end);
-    DisparityRange::new(min.unwrap_or_else(|| scaled(found.min)), scaled(found.max))
-}
-
-/// Warnings about a pair from its overview; `range` is that of the user, if there is one.
-fn warnings(Overview { pair, factor }: &Overview, range: Option<DisparityRange>) -> Vec<Warning> {
-    let factor = i32::try_from(*factor).unwrap_or(i32::MAX);
-    let range = range.map(|DisparityRange { min, max }| DisparityRange {
-        min: min.div_euclid(factor),
-        max: -(-max).div_euclid(factor),
-    });
-    let mut warnings = check::warnings(pair, range);
-    for warning in &mut warnings {
-        if let Warning::NotRectified { offset } = warning {
-            *offset *= factor.unsigned_abs();
-        }
-    }
-    warnings
 }

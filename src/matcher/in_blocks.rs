@@ -20,12 +20,11 @@ impl Matcher {
     ) -> Result<Matched> {
         let Request { range, method, prior, .. } = request;
         let blocks = Blocks::new(pair.size(), range, method)?;
-        let known = match request.known {
-            Some(known) => known,
-            None => {
-                let measured = async || blocks.conditioning(|part| Ok(pair.crop(part)));
-                self.threads.run(pair.size().0 * pair.size().1, measured).await??
-            }
+        let known = if let Some(known) = request.known {
+            known
+        } else {
+            let measured = async || blocks.conditioning(|part| Ok(pair.crop(part)));
+            self.threads.run(pair.size().0 * pair.size().1, measured).await??
         };
         let count = blocks.list().len();
         let mut all: Option<Matched> = None;
@@ -38,17 +37,14 @@ impl Matcher {
             let request = Request { known: Some(known), prior: prior.as_ref(), ..request };
             let matched = self.solve(&block.window_of(pair), request, observer, None).await?;
             let maps = block.maps_of(&matched.maps);
-            let whole = match &mut all {
-                Some(whole) => {
-                    whole.add(matched);
-                    whole
-                }
-                None => {
-                    let (width, height) = pair.size();
-                    let plan = Plan::new(width, height, range, method)?.with_prior(prior.is_some());
-                    let maps = Maps::blank(pair.size(), maps.right.is_some());
-                    all.insert(Matched { maps, plan, blocks: count, ..matched })
-                }
+            let whole = if let Some(whole) = &mut all {
+                whole.add(matched);
+                whole
+            } else {
+                let (width, height) = pair.size();
+                let plan = Plan::new(width, height, range, method)?.with_prior(prior.is_some());
+                let maps = Maps::blank(pair.size(), maps.right.is_some());
+                all.insert(Matched { maps, plan, blocks: count, ..matched })
             };
             whole.maps.paste(&maps, block.part());
         }

@@ -48,7 +48,7 @@ impl PairFiles<'_> {
 enum Pixels {
     /// A pair that had to be read whole.
     Whole(Pair),
-    Files(PairWindows),
+    Files(Box<PairWindows>),
 }
 
 /// A pair that is read by windows. What concerns all of it comes from an overview, which is read on first use.
@@ -68,7 +68,7 @@ impl LargePair {
 
     /// The pair in `windows`, with the memory of `method`.
     pub(crate) fn of_files(windows: PairWindows, method: &Method) -> Self {
-        Self::new(Pixels::Files(windows), method)
+        Self::new(Pixels::Files(Box::new(windows)), method)
     }
 
     /// A pair that is in memory.

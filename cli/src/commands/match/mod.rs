@@ -229,17 +229,13 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     if request.goes_by_blocks()? {
         return in_blocks::run(&request);
     }
-    match (&args.region.roi, request.files()) {
-        (Some(part), Some(files)) => {
-            let (input, read) = stop::at_once(|| window_of(&request, files, part))?;
-            run_on(&request, input, read)
-        }
-        _ => {
-            let input = stop::at_once(|| request.input())?;
-            let whole = Rect::whole(input.size);
-            run_on(&request, input, whole)
-        }
+    if let (Some(part), Some(files)) = (&args.region.roi, request.files()) {
+        let (input, read) = stop::at_once(|| window_of(&request, files, part))?;
+        return run_on(&request, input, read);
     }
+    let input = stop::at_once(|| request.input())?;
+    let whole = Rect::whole(input.size);
+    run_on(&request, input, whole)
 }
 
 /// The window of the pair that a match of the region `part` reads, and where it is.
