@@ -14,7 +14,6 @@ use mrfgs::{Conditioning, Error, Matched};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::blocks::joined::Bands;
 use crate::blocks::stored::{self, BlockRecord, Rows};
 use crate::failure::Result;
 use crate::outputs::{Claim, files};
@@ -271,11 +270,6 @@ impl BlockFiles {
     ) -> mrfgs::Result<()> {
         let record = BlockRecord::new(&self.of, &self.parts[index], matched, note, seconds);
         stored::write(&self.path(index), &record, maps)
-    }
-
-    /// The joined maps of all blocks, as bands of rows from the top.
-    pub(crate) fn bands(&self) -> Bands<'_> {
-        Bands::new(self)
     }
 }
 

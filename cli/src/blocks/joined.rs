@@ -21,7 +21,8 @@ pub(crate) struct Bands<'a> {
 }
 
 impl<'a> Bands<'a> {
-    pub(super) fn new(files: &'a BlockFiles) -> Self {
+    /// The bands of the joined blocks, which are all complete.
+    pub(crate) fn of(files: &'a BlockFiles) -> Self {
         Self { files, next: 0, open: Vec::new(), left: 0 }
     }
 

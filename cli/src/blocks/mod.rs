@@ -5,4 +5,5 @@ mod joined;
 mod stored;
 
 pub(crate) use folder::{BlockFiles, BlockFolder, BlockState, Fingerprint, Known};
+pub(crate) use joined::Bands;
 pub(crate) use stored::BlockRecord;

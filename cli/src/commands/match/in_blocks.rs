@@ -20,9 +20,11 @@ use mrfgs::{Conditioning, Error, Matcher, Prior};
 use serde::Serialize;
 use tempfile::TempDir;
 
-use super::{Args, Request, check_outputs, record_files, say_end, write_outputs};
+use super::args::Args;
+use super::outputs::{check_outputs, record_files, say_end, write_outputs};
+use super::request::Request;
 use crate::args::{CameraArgs, CropArgs, PriorArgs, PriorView, ReadingArgs, RectificationArgs, Search, Sign};
-use crate::blocks::{BlockFiles, BlockFolder, BlockRecord, BlockState, Fingerprint, Known};
+use crate::blocks::{Bands, BlockFiles, BlockFolder, BlockRecord, BlockState, Fingerprint, Known};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, Found, MatchRecord, Outcome, Tally, View, Written, files};
 use crate::pairs::input::{self, Input};
@@ -346,7 +348,7 @@ impl BlockRun<'_> {
         let mut tally = Tally::default();
         let mut thin = Maps::blank((width.div_ceil(step), height.div_ceil(step)), false);
         let (mut top, mut y) = (0, 0);
-        for band in self.files.bands() {
+        for band in Bands::of(self.files) {
             let band = band?;
             tally.add(&band);
             let rows = band.disparity.height();
@@ -367,7 +369,7 @@ impl BlockRun<'_> {
     fn whole(&self) -> Result<Maps> {
         let mut whole: Option<Maps> = None;
         let mut top = 0;
-        for band in self.files.bands() {
+        for band in Bands::of(self.files) {
             let band = band?;
             let (width, rows) = band.disparity.size();
             let whole = whole.get_or_insert_with(|| Maps::blank(self.files.size(), band.right.is_some()));
@@ -392,9 +394,10 @@ impl BlockRun<'_> {
         };
         let writer = template.outcome(&Maps::blank((1, 1), false), None).writer(View::Left);
         let output = args.output();
-        written.note(output, writer.disparity_in_bands(output, files.size(), &mut files.bands().map(map)))?;
+        written
+            .note(output, writer.disparity_in_bands(output, files.size(), &mut Bands::of(files).map(map)))?;
         for (word, path) in also {
-            let (size, bands) = (files.size(), files.bands());
+            let (size, bands) = (files.size(), Bands::of(files));
             let made =
                 args.also.write_in_bands(word, path, size, bands, &|maps| template.outcome(maps, None));
             said.extend(written.note(path, made)?);
