@@ -99,9 +99,10 @@ pub(crate) fn run(
         let (width, height) = matched.maps.disparity.size();
         let name = name.map(|name| format!("{name}: ")).unwrap_or_default();
         let (labels, iterations) = (matched.range().labels(), matched.iterations);
-        let tiles = match matched.tiles.count() {
-            1 => String::new(),
-            count => format!(", {count} tiles"),
+        let tiles = match (matched.blocks, matched.tiles.count()) {
+            (1, 1) => String::new(),
+            (1, count) => format!(", {count} tiles"),
+            (count, _) => format!(", {count} blocks"),
         };
         console::say(&format!(
             "{name}{width} x {height}, {labels} disparit{}{tiles}, {iterations} iteration{} in {:.2} s on {}",

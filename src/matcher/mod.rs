@@ -27,7 +27,7 @@ use crate::plan::Plan;
 use crate::prior::Prior;
 use crate::program::Program;
 use crate::program::tiles::Tiles;
-use crate::region::Region;
+use crate::region::{Blocks, Region};
 use crate::threads::Threads;
 use crate::watch::Observer;
 use check::check;
@@ -233,13 +233,11 @@ impl Matcher {
             fits(prior, pair)?;
         }
         let input = (pair, known, prior);
-        let tiles = match Tiles::new(&plan) {
-            // An inspector sees a single match.
-            Err(Error::Budget(BudgetError::NoTileFits { .. })) if inspector.is_none() => {
-                return Box::pin(self.solve_in_blocks(pair, request, observer)).await;
-            }
-            tiles => tiles?,
-        };
+        // An inspector sees a single match.
+        if inspector.is_none() && Blocks::pay_for(&plan) {
+            return Box::pin(self.solve_in_blocks(pair, request, observer)).await;
+        }
+        let tiles = Tiles::new(&plan)?;
         let needed = plan.bytes().div_ceil(1 << 20);
         if inspector.is_some() && needed > plan.method.tiles.memory.into() {
             return Err(BudgetError::Steps { needed }.into());

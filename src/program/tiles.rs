@@ -65,61 +65,20 @@ impl Tiles {
     /// # Errors
     /// The errors of [`Tiles::new`].
     pub fn with_overlap(whole: &Plan, overlap: usize) -> Result<Self> {
-        Self::at_all_sizes(whole, overlap).map_err(|needed| {
+        let cut = Cut::at_all_sizes(whole, overlap).map_err(|needed| {
             let FullSize { size: (width, height), range } = whole.of_pair();
             let memory = whole.method.tiles.memory;
             // With a larger limit, more may be held: the reported limit must be enough.
             let mut needed = needed;
             while let Ok(granted) = needed.try_into()
-                && let Err(more) = Self::at_all_sizes(&whole.granted(granted), overlap)
+                && let Err(more) = Cut::at_all_sizes(&whole.granted(granted), overlap)
             {
                 needed = more.max(needed + 1);
             }
-            BudgetError::NoTileFits { memory, width, height, labels: range.labels(), needed }.into()
-        })
-    }
-
-    /// Like [`Tiles::new`]; `None` if no tile is small enough, without the time to find what would be.
-    pub(crate) fn if_any_fit(whole: &Plan) -> Option<Self> {
-        Self::at_all_sizes(whole, OVERLAP).ok()
-    }
-
-    /// The tiles, if tiles of the match at twice the size fit too; else the MiB that the smallest ones need.
-    fn at_all_sizes(whole: &Plan, overlap: usize) -> Result<Self, u64> {
-        let tiles = Self::at_one_size(whole, overlap)?;
-        // Other errors of that size are reported when it is matched.
-        if let Ok(Some(double)) = whole.doubled() {
-            Self::at_one_size(&double, overlap)?;
-        }
-        Ok(tiles)
-    }
-
-    /// The tiles, or the MiB that the smallest ones need.
-    fn at_one_size(whole: &Plan, overlap: usize) -> Result<Self, u64> {
-        let (width, height) = whole.size();
-        let memory = u64::from(whole.method.tiles.memory) << 20;
-        if streamed(whole).bytes() <= memory {
+            BudgetError::NoTileFits { memory, width, height, labels: range.labels(), needed }
+        })?;
+        let Some(Cut { across, down, crop: (width, height) }) = cut else {
             return Ok(Self::in_one_piece(whole));
-        }
-        let step = 1 << (whole.levels.len() - 1);
-        let reach = |disparity: i32| disparity.max(0) as usize;
-        let range = whole.range;
-        let across = Axis::new(width, [overlap + reach(range.max), overlap + reach(-range.min)], step);
-        let down = Axis::new(height, [overlap; 2], step);
-
-        let bytes =
-            |(width, height): (usize, usize)| beside(whole) + streamed(&whole.resized(width, height)).bytes();
-        let candidates = (1..=across.most()).filter_map(|columns| {
-            let width = across.crop(columns);
-            // The smallest number of rows of tiles that fits.
-            let rows = partition(1..down.most() + 1, |rows| bytes((width, down.crop(rows))) <= memory)?;
-            let size = (width, down.crop(rows));
-            Some((across.cropped(size.0) * down.cropped(size.1), size))
-        });
-        let Some((_, (width, height))) = candidates.min_by_key(|&(pixels, _)| pixels) else {
-            let least =
-                bytes((across.crop(across.most()), down.crop(down.most()))).min(streamed(whole).bytes());
-            return Err(least.div_ceil(1 << 20));
         };
         let rows = down.spans(height);
         let mut tiles = Vec::new();
@@ -135,6 +94,14 @@ impl Tiles {
             }
         }
         Ok(Self { whole: whole.clone(), tiles })
+    }
+
+    /// Number of pixels of all tiles that [`Tiles::new`] finds, those that they share counted for each; `None` if no tile is small enough.
+    pub(crate) fn pixels(whole: &Plan) -> Option<usize> {
+        let cut = Cut::at_all_sizes(whole, OVERLAP).ok()?;
+        Some(cut.map_or(whole.levels[0].pixels(), |cut| {
+            cut.across.cropped(cut.crop.0) * cut.down.cropped(cut.crop.1)
+        }))
     }
 
     /// The whole image in one piece, regardless of its memory.
@@ -185,6 +152,56 @@ impl Tiles {
 
     fn beside(&self) -> u64 {
         if self.count() == 1 { 0 } else { beside(&self.whole) }
+    }
+}
+
+/// How an image is cut.
+struct Cut {
+    across: Axis,
+    down: Axis,
+    /// (width, height) of the largest crop.
+    crop: (usize, usize),
+}
+
+impl Cut {
+    /// The cut, if tiles of the match at twice the size fit too, `None` for one piece; else the MiB that the smallest tiles need.
+    fn at_all_sizes(whole: &Plan, overlap: usize) -> Result<Option<Self>, u64> {
+        let cut = Self::at_one_size(whole, overlap)?;
+        // Other errors of that size are reported when it is matched.
+        if let Ok(Some(double)) = whole.doubled() {
+            Self::at_one_size(&double, overlap)?;
+        }
+        Ok(cut)
+    }
+
+    /// The cut, `None` for one piece, or the MiB that the smallest tiles need.
+    fn at_one_size(whole: &Plan, overlap: usize) -> Result<Option<Self>, u64> {
+        let (width, height) = whole.size();
+        let memory = u64::from(whole.method.tiles.memory) << 20;
+        if streamed(whole).bytes() <= memory {
+            return Ok(None);
+        }
+        let step = 1 << (whole.levels.len() - 1);
+        let reach = |disparity: i32| disparity.max(0) as usize;
+        let range = whole.range;
+        let across = Axis::new(width, [overlap + reach(range.max), overlap + reach(-range.min)], step);
+        let down = Axis::new(height, [overlap; 2], step);
+
+        let bytes =
+            |(width, height): (usize, usize)| beside(whole) + streamed(&whole.resized(width, height)).bytes();
+        let candidates = (1..=across.most()).filter_map(|columns| {
+            let width = across.crop(columns);
+            // The smallest number of rows of tiles that fits.
+            let rows = partition(1..down.most() + 1, |rows| bytes((width, down.crop(rows))) <= memory)?;
+            let size = (width, down.crop(rows));
+            Some((across.cropped(size.0) * down.cropped(size.1), size))
+        });
+        let Some((_, crop)) = candidates.min_by_key(|&(pixels, _)| pixels) else {
+            let least =
+                bytes((across.crop(across.most()), down.crop(down.most()))).min(streamed(whole).bytes());
+            return Err(least.div_ceil(1 << 20));
+        };
+        Ok(Some(Self { across, down, crop }))
     }
 }
 

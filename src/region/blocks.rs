@@ -5,8 +5,9 @@ use crate::error::{BudgetError, Error, Result};
 use crate::front::conditioning::Conditioning;
 use crate::image::{Pair, Rect};
 use crate::options::{DisparityRange, Method};
-use crate::plan::Plan;
+use crate::plan::{FullSize, Plan};
 use crate::program::tiles::{Axis, Tiles};
+use std::iter;
 
 /// Width of the margin around a block, in pixels.
 ///
@@ -17,6 +18,8 @@ use crate::program::tiles::{Axis, Tiles};
 const MARGIN: usize = 128;
 /// About the largest width and height of a block in pixels, so that a large pair has blocks to share, and little is lost with one of them.
 const LARGEST: usize = 4096;
+/// A pair whose tiles have fewer pixels than this many times its own is matched in tiles, which share maps, even if blocks took less time.
+const MOST_IN_TILES: f64 = 1.5;
 /// Samples in which corrections are measured lie in the middle of the parts of a grid with this many columns and rows.
 const SAMPLES: usize = 3;
 /// Largest and smallest width and height of a sample in pixels.
@@ -43,45 +46,41 @@ impl Blocks {
     ///
     /// # Errors
     /// [`Error::Option`] for options out of range, and [`Error::Budget`] if even the smallest block does not fit.
-    pub fn new((width, height): (usize, usize), range: DisparityRange, method: &Method) -> Result<Self> {
-        let whole = Plan::new(width, height, range, method)?;
-        let halves = usize::from(whole.full.is_some());
-        let step = 1 << (whole.levels.len() - 1 + halves);
-        let mut reach = [range.max, -range.min].map(|disparity| usize::try_from(disparity).unwrap_or(0));
-        if method.refinement.right_map {
-            // The right view sees the other way.
-            reach = [reach[0].max(reach[1]); 2];
-        }
-        let across = Axis::new(width, reach.map(|reach| MARGIN + reach), step);
-        let down = Axis::new(height, [MARGIN; 2], step);
-        let smallest = (across.crop(across.most()), down.crop(down.most()));
-        let sides =
-            std::iter::successors(Some(LARGEST), |side| Some(side * 3 / 4)).take_while(|side| *side >= step);
-        let windows = sides.map(|side| {
-            let crop = |axis: &Axis| axis.crop(axis.length().div_ceil(side));
-            (crop(&across), crop(&down))
-        });
-        // With a prior or without one, the blocks are the same.
-        let plan = |w: usize, h: usize| Plan::new(w, h, range, method).map(|plan| plan.with_prior(true));
-        let time = |&(w, h): &(usize, usize)| {
-            let tiles = Tiles::if_any_fit(&plan(w, h).ok()?)?;
-            let matched: usize =
-                tiles.list().iter().map(|tile| tile.crop.size().0 * tile.crop.size().1).sum();
-            let windows = across.cropped(w) as f64 * down.cropped(h) as f64;
-            Some(windows * matched as f64 / (w * h) as f64)
+    pub fn new(size: (usize, usize), range: DisparityRange, method: &Method) -> Result<Self> {
+        let whole = Plan::new(size.0, size.1, range, method)?;
+        let grid = Grid::of(&whole);
+        let Some((_, (width, height))) = grid.quickest(&whole) else {
+            return Err(too_little(&whole, grid.smallest()));
         };
-        let timed = windows.chain([smallest]).filter_map(|window| Some((time(&window)?, window)));
-        let Some((_, (w, h))) = timed.min_by(|(a, _), (b, _)| a.total_cmp(b)) else {
-            return Err(too_little(&whole, smallest));
-        };
-        let rows = down.spans(h);
+        let rows = grid.down.spans(height);
         let list = rows.iter().flat_map(|[y, window_y]| {
-            across.spans(w).into_iter().map(|[x, window_x]| Region {
+            grid.across.spans(width).into_iter().map(|[x, window_x]| Region {
                 part: Rect { x, y: y.clone() },
                 window: Rect { x: window_x, y: window_y.clone() },
             })
         });
-        Ok(Self { size: (width, height), list: list.collect(), reach, range, method: method.clone() })
+        Ok(Self { size, list: list.collect(), reach: grid.reach, range, method: method.clone() })
+    }
+
+    /// Whether a pair of (width, height) pixels is matched in blocks: if its tiles do not fit in the memory of `method`, or are so small
+    /// that they take longer than blocks.
+    ///
+    /// # Errors
+    /// [`Error::Option`] for options out of range.
+    pub fn pay(size: (usize, usize), range: DisparityRange, method: &Method) -> Result<bool> {
+        Ok(Self::pay_for(&Plan::new(size.0, size.1, range, method)?))
+    }
+
+    /// [`Blocks::pay`] for the pair of a plan.
+    pub(crate) fn pay_for(whole: &Plan) -> bool {
+        let Some(pixels) = Tiles::pixels(whole) else { return true };
+        let share = pixels as f64 / whole.levels[0].pixels() as f64;
+        if share < MOST_IN_TILES {
+            return false;
+        }
+        let (width, height) = whole.of_pair().size;
+        let in_tiles = share * (width * height) as f64;
+        Grid::of(whole).quickest(whole).is_some_and(|(in_blocks, _)| in_blocks < in_tiles)
     }
 
     /// (width, height) of the pair.
@@ -129,11 +128,64 @@ impl Blocks {
     }
 }
 
+/// The ways to cut a pair into blocks.
+struct Grid {
+    across: Axis,
+    down: Axis,
+    /// As [`Blocks::reach`].
+    reach: [usize; 2],
+    /// Blocks begin at multiples of this many pixels.
+    step: usize,
+}
+
+impl Grid {
+    fn of(whole: &Plan) -> Self {
+        let FullSize { size: (width, height), range } = whole.of_pair();
+        let halves = usize::from(whole.full.is_some());
+        let step = 1 << (whole.levels.len() - 1 + halves);
+        let mut reach = [range.max, -range.min].map(|disparity| usize::try_from(disparity).unwrap_or(0));
+        if whole.method.refinement.right_map {
+            // The right view sees the other way.
+            reach = [reach[0].max(reach[1]); 2];
+        }
+        let across = Axis::new(width, reach.map(|reach| MARGIN + reach), step);
+        let down = Axis::new(height, [MARGIN; 2], step);
+        Self { across, down, reach, step }
+    }
+
+    /// (width, height) of the smallest window.
+    fn smallest(&self) -> (usize, usize) {
+        (self.across.crop(self.across.most()), self.down.crop(self.down.most()))
+    }
+
+    /// The size of the windows that take the least time, and the pixels that are then matched, those of tiles counted for each; `None` if
+    /// no window fits in the memory.
+    fn quickest(&self, whole: &Plan) -> Option<(f64, (usize, usize))> {
+        let sides =
+            iter::successors(Some(LARGEST), |side| Some(side * 3 / 4)).take_while(|side| *side >= self.step);
+        let windows = sides.map(|side| {
+            let crop = |axis: &Axis| axis.crop(axis.length().div_ceil(side));
+            (crop(&self.across), crop(&self.down))
+        });
+        let pixels = |(width, height): (usize, usize)| {
+            let plan = plan_of((width, height), whole).ok()?;
+            let share = Tiles::pixels(&plan)? as f64 / plan.levels[0].pixels() as f64;
+            Some(share * self.across.cropped(width) as f64 * self.down.cropped(height) as f64)
+        };
+        let timed = windows.chain([self.smallest()]).filter_map(|window| Some((pixels(window)?, window)));
+        timed.min_by(|(a, _), (b, _)| a.total_cmp(b))
+    }
+}
+
+/// The plan of a window of (width, height) pixels. With a prior or without one, the blocks are the same.
+fn plan_of((width, height): (usize, usize), whole: &Plan) -> Result<Plan> {
+    Ok(Plan::new(width, height, whole.of_pair().range, &whole.method)?.with_prior(true))
+}
+
 /// The error that the memory holds no block; `smallest` is the size of the smallest window.
 fn too_little(whole: &Plan, smallest: (usize, usize)) -> Error {
     let of_pair = whole.of_pair();
-    let tiles = Plan::new(smallest.0, smallest.1, of_pair.range, &whole.method)
-        .and_then(|plan| Tiles::new(&plan.with_prior(true)));
+    let tiles = plan_of(smallest, whole).and_then(|plan| Tiles::new(&plan));
     match tiles {
         Err(Error::Budget(BudgetError::NoTileFits { memory, labels, needed, .. })) => {
             let (width, height) = of_pair.size;

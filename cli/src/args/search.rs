@@ -91,6 +91,12 @@ impl Search {
         nearest.or(self.max_depth.map(|_| "--max-depth"))
     }
 
+    /// The range that `--max-disparity` gives, for flags that count by `sign`; `None` without it or for an invalid range.
+    pub(crate) fn given(&self, sign: Sign) -> Option<DisparityRange> {
+        let Some(Largest::Pixels(max)) = self.max_disparity else { return None };
+        DisparityRange::new(self.min_disparity.unwrap_or(max.min(0)), max).ok().map(|range| sign.range(range))
+    }
+
     /// The disparities of `--min-depth` and `--max-depth`, rounded outward so that both depths are searched.
     fn of_depths(&self, calibration: Option<(&Path, &Calibration)>) -> Result<[Option<i32>; 2]> {
         let Some(flag) = self.takes_cameras() else { return Ok([None, None]) };

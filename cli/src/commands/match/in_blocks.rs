@@ -31,7 +31,7 @@ use crate::pairs::input::{self, Input};
 use crate::pairs::large::LargePair;
 use crate::progress::Counter;
 use crate::text::plural;
-use crate::{console, plan, remedy, stop};
+use crate::{console, remedy, stop};
 
 /// How long to wait while other runs match the remaining blocks.
 const PATIENCE: Duration = Duration::from_millis(100);
@@ -121,12 +121,6 @@ pub(super) fn progress(request: &Request, blocks: &Blocks) -> Result<Option<(usi
 /// Matches the pair in blocks, and writes the outputs once all are complete.
 pub(super) fn run(request: &Request) -> Result<()> {
     let Request { args, method, cameras, need, .. } = request;
-    if args.dry_run {
-        let input = stop::at_once(|| request.input())?;
-        check_outputs(args, &input)?;
-        let blocks = Blocks::new(input.size, input.range, method)?;
-        return Ok(console::print(&plan::describe_blocks(&blocks, input.range, method)?)?);
-    }
     // Checks what can be checked before a folder is made.
     let asked = Asked::new(request)?;
     let place = Place::new(request)?;

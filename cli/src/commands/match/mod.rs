@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use mrfgs::image::{Pair, Rect};
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::program::tiles::Tiles;
+use mrfgs::options::DisparityRange;
 use mrfgs::region::{Blocks, Region};
 use mrfgs::sigma::Sigma;
 use mrfgs::{Matcher, check};
@@ -38,7 +38,7 @@ pub(crate) fn run(mut args: Args) -> Result<()> {
     {
         return dry_run(&request, files);
     }
-    if request.goes_by_blocks()? {
+    if !args.dry_run && request.goes_by_blocks()? {
         return in_blocks::run(&request);
     }
     if let (Some(part), Some(files)) = (&args.region.roi, request.files()) {
@@ -74,13 +74,27 @@ fn dry_run(request: &Request, files: PairFiles) -> Result<()> {
     check_outputs(args, &input)?;
     let view = PriorView { size: input.size, sign: args.sign, rig: input.as_taken(known) };
     let prior = args.prior.read(view)?;
-    let (width, height) = region.as_ref().map_or(input.size, |region| region.window().size());
-    let plan = Plan::new(width, height, input.range, &request.method)?.with_prior(prior.is_some());
-    if args.blocks.blocks.is_none() && Tiles::new(&plan).is_ok() {
+    let window = region.as_ref().map(|region| region.window().size());
+    print_plan(request, input.size, window, input.range, prior.is_some())
+}
+
+/// Prints the plan of a match of the `window` of a pair of this `size`, or of all of it.
+fn print_plan(
+    request: &Request,
+    size: (usize, usize),
+    window: Option<(usize, usize)>,
+    range: DisparityRange,
+    prior: bool,
+) -> Result<()> {
+    let method = &request.method;
+    let by_blocks = request.args.blocks.blocks.is_some() || Blocks::pay(size, range, method)?;
+    if window.is_some() || !by_blocks {
+        let (width, height) = window.unwrap_or(size);
+        let plan = Plan::new(width, height, range, method)?.with_prior(prior);
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
-    let blocks = Blocks::new(input.size, input.range, &request.method)?;
-    let mut text = plan::describe_blocks(&blocks, input.range, &request.method)?;
+    let blocks = Blocks::new(size, range, method)?;
+    let mut text = plan::describe_blocks(&blocks, range, method)?;
     if let Some((complete, all)) = in_blocks::progress(request, &blocks)? {
         let _ = writeln!(text, "\n{complete} of {all} blocks are complete");
     }
@@ -105,14 +119,13 @@ fn run_on(request: &Request, input: Input, read: Rect) -> Result<()> {
     if !args.quiet {
         input.warn(region.as_ref());
     }
-    let (width, height) = region.as_ref().map_or(input.size, |region| region.window().size());
     let view = PriorView { size: input.size, sign: args.sign, rig: input.as_taken(known) };
     let prior = args.prior.read(view)?;
     let prior =
         prior.map(|prior| if read == Rect::whole(input.size) { prior } else { Arc::new(prior.crop(&read)) });
     if args.dry_run {
-        let plan = Plan::new(width, height, range, method)?.with_prior(prior.is_some());
-        return Ok(console::print(&plan::describe(&plan)?)?);
+        let window = region.as_ref().map(|region| region.window().size());
+        return print_plan(request, input.size, window, range, prior.is_some());
     }
     let mut matcher = Matcher::builder().execution(execution.clone()).build()?;
     let searched = input.searched(|wider| check_range(args, wider).is_ok());

@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use mrfgs::calibration::cameras::ThirdCamera;
-use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::program::tiles::Tiles;
 use mrfgs::options::{DisparityRange, Execution, Method};
 use mrfgs::rectification::Options;
+use mrfgs::region::Blocks;
 
 use super::args::Args;
 use crate::args::CameraNeed;
@@ -80,16 +79,17 @@ impl<'a> Request<'a> {
         if files::is_printed(output) { std::env::temp_dir() } else { files::parent(output).to_owned() }
     }
 
-    /// Whether the pair is matched in blocks: where the user says so, and where a pair of its size does not fit into the memory.
+    /// Whether the pair is matched in blocks that are read by windows: where the user says so, and where that pays for a pair of its size
+    /// and the range of the flags, or the least one.
     pub(super) fn goes_by_blocks(&self) -> Result<bool> {
         if self.args.blocks.blocks.is_some() {
             return Ok(true);
         }
         // Errors of the files are reported when these are read.
-        let Some(Ok((width, height))) = self.files().map(|files| files.reader.size(files.left)) else {
+        let Some(Ok(size)) = self.files().map(|files| files.reader.size(files.left)) else {
             return Ok(false);
         };
-        let least = Plan::new(width, height, DisparityRange::new(0, 0)?, &self.method)?;
-        Ok(self.args.region.roi.is_none() && Tiles::new(&least).is_err())
+        let range = self.args.pair.search.given(self.args.sign).unwrap_or(DisparityRange { min: 0, max: 0 });
+        Ok(self.args.region.roi.is_none() && Blocks::pay(size, range, &self.method)?)
     }
 }
