@@ -43,14 +43,19 @@ fn blocks_partition_the_view_and_windows_hold_what_they_need() {
             Err(Error::Budget(BudgetError::NoTileFits { needed, width, height, .. })) => {
                 refused += 1;
                 assert_eq!((width, height), size, "{case}");
-                // With as much as the error asks for, there are blocks.
+                // With as much as the error asks for, there are blocks, or tiles of the whole pair.
                 method.tiles.memory = u32::try_from(needed).unwrap();
-                assert!(Blocks::new(size, range, &method).is_ok(), "{case}, {needed} MiB");
+                let whole = Plan::new(size.0, size.1, range, &method).unwrap();
+                let fits = Blocks::new(size, range, &method).is_ok() || Tiles::new(&whole).is_ok();
+                assert!(fits, "{case}, {needed} MiB");
                 continue;
             }
             Err(e) => panic!("{case}: {e}"),
         };
         assert_eq!(blocks.size(), size);
+        // They pay where tiles do not fit.
+        let whole = Plan::new(size.0, size.1, range, &method).unwrap();
+        assert!(Tiles::new(&whole).is_ok() || Blocks::pay(size, range, &method).unwrap(), "{case}");
         cut += usize::from(blocks.list().len() > 1);
         let step = 1 << (Plan::new(size.0, size.1, range, &method).unwrap().levels.len() - 1);
         let (mut pixels, mut sizes) = (0, BTreeSet::new());

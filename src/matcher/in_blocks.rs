@@ -1,6 +1,6 @@
 //! Pairs that do not fit in the memory of their method, not even in tiles: their blocks are matched one by one.
 
-use super::{Matched, Matcher, Request};
+use super::{Matched, Matcher, Request, fits};
 use crate::error::Result;
 use crate::image::Pair;
 use crate::maps::Maps;
@@ -19,6 +19,9 @@ impl Matcher {
         observer: Observer<'_>,
     ) -> Result<Matched> {
         let Request { range, method, prior, .. } = request;
+        if let Some(prior) = prior {
+            fits(prior, pair)?;
+        }
         let blocks = Blocks::new(pair.size(), range, method)?;
         let known = if let Some(known) = request.known {
             known
@@ -35,7 +38,7 @@ impl Matcher {
             };
             let prior = prior.map(|prior| Arc::new(prior.crop(block.window())));
             let request = Request { known: Some(known), prior: prior.as_ref(), ..request };
-            let matched = self.solve(&block.window_of(pair), request, observer, None).await?;
+            let matched = self.solve_at_once(&block.window_of(pair), request, observer, None).await?;
             let maps = block.maps_of(&matched.maps);
             let whole = if let Some(whole) = &mut all {
                 whole.add(matched);

@@ -218,8 +218,28 @@ impl Matcher {
         Ok(Matched { maps: region.maps_of(&matched.maps), ..matched })
     }
 
-    /// Matches `pair` on the device, or on the CPU path.
+    /// Matches `pair`, in blocks where that pays.
     async fn solve(
+        &mut self,
+        pair: &Pair,
+        request: Request<'_>,
+        observer: Observer<'_>,
+        inspector: Option<Inspector<'_>>,
+    ) -> Result<Matched> {
+        let Request { range, method, prior, .. } = request;
+        let (width, height) = pair.size();
+        let plan = Plan::new(width, height, range, method)?.with_prior(prior.is_some());
+        let pays =
+            || Ok::<_, Error>(Tiles::pixels(&plan).is_none() || Blocks::pay((width, height), range, method)?);
+        // An inspector sees a single match.
+        if inspector.is_none() && pays()? {
+            return self.solve_in_blocks(pair, request, observer).await;
+        }
+        self.solve_at_once(pair, request, observer, inspector).await
+    }
+
+    /// Matches `pair` in one piece or in tiles, on the device or on the CPU path.
+    async fn solve_at_once(
         &mut self,
         pair: &Pair,
         request: Request<'_>,
@@ -233,10 +253,6 @@ impl Matcher {
             fits(prior, pair)?;
         }
         let input = (pair, known, prior);
-        // An inspector sees a single match.
-        if inspector.is_none() && Blocks::pay_for(&plan) {
-            return Box::pin(self.solve_in_blocks(pair, request, observer)).await;
-        }
         let tiles = Tiles::new(&plan)?;
         let needed = plan.bytes().div_ceil(1 << 20);
         if inspector.is_some() && needed > plan.method.tiles.memory.into() {

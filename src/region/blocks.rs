@@ -68,19 +68,15 @@ impl Blocks {
     /// # Errors
     /// [`Error::Option`] for options out of range.
     pub fn pay(size: (usize, usize), range: DisparityRange, method: &Method) -> Result<bool> {
-        Ok(Self::pay_for(&Plan::new(size.0, size.1, range, method)?))
-    }
-
-    /// [`Blocks::pay`] for the pair of a plan.
-    pub(crate) fn pay_for(whole: &Plan) -> bool {
-        let Some(pixels) = Tiles::pixels(whole) else { return true };
+        let whole = Plan::new(size.0, size.1, range, method)?;
+        let Some(pixels) = Tiles::pixels(&whole) else { return Ok(true) };
         let share = pixels as f64 / whole.levels[0].pixels() as f64;
         if share < MOST_IN_TILES {
-            return false;
+            return Ok(false);
         }
-        let (width, height) = whole.of_pair().size;
-        let in_tiles = share * (width * height) as f64;
-        Grid::of(whole).quickest(whole).is_some_and(|(in_blocks, _)| in_blocks < in_tiles)
+        let in_tiles = share * (size.0 * size.1) as f64;
+        let pays = |(in_blocks, window)| window != size && in_blocks < in_tiles;
+        Ok(Grid::of(&whole).quickest(&whole).is_some_and(pays))
     }
 
     /// (width, height) of the pair.
@@ -182,16 +178,19 @@ fn plan_of((width, height): (usize, usize), whole: &Plan) -> Result<Plan> {
     Ok(Plan::new(width, height, whole.of_pair().range, &whole.method)?.with_prior(true))
 }
 
-/// The error that the memory holds no block; `smallest` is the size of the smallest window.
+/// The error that the memory holds no block; `smallest` is the size of the smallest window. The whole pair in tiles may need less.
 fn too_little(whole: &Plan, smallest: (usize, usize)) -> Error {
-    let of_pair = whole.of_pair();
-    let tiles = plan_of(smallest, whole).and_then(|plan| Tiles::new(&plan));
-    match tiles {
-        Err(Error::Budget(BudgetError::NoTileFits { memory, labels, needed, .. })) => {
-            let (width, height) = of_pair.size;
-            BudgetError::NoTileFits { memory, width, height, labels, needed }.into()
-        }
-        Err(error) => error,
-        Ok(_) => unreachable!("a window that fits is a block"),
+    let in_blocks = plan_of(smallest, whole).and_then(|plan| Tiles::new(&plan));
+    match (Tiles::new(whole), in_blocks) {
+        (Err(Error::Budget(in_tiles)), Err(Error::Budget(in_blocks))) => match (in_tiles, in_blocks) {
+            (
+                BudgetError::NoTileFits { memory, width, height, labels, needed },
+                BudgetError::NoTileFits { needed: for_block, .. },
+            ) => BudgetError::NoTileFits { memory, width, height, labels, needed: needed.min(for_block) }
+                .into(),
+            (other, _) => other.into(),
+        },
+        (Ok(_), Err(error)) | (Err(error), _) => error,
+        (Ok(_), Ok(_)) => unreachable!("a window that fits is a block"),
     }
 }

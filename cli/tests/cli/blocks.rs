@@ -247,7 +247,7 @@ fn memory_is_that_of_a_block() {
     let plan = run(&folder, &format!("{whole} --dry-run")).succeeded().stdout;
     assert!(plan.contains("|         540 MiB"), "{plan}");
     // The program with its stacks and the system's reserves takes 350 MB of it.
-    shell(&folder, "ulimit -v 500000", &one).succeeded();
+    shell(&folder, "ulimit -v 650000", &one).succeeded();
     // Control: a match in one piece does not fit.
-    shell(&folder, "ulimit -v 500000", &whole).failed(1, "memory");
+    shell(&folder, "ulimit -v 650000", &whole).failed(1, "memory");
 }
