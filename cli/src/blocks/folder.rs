@@ -25,30 +25,32 @@ const PLACES: u64 = 16;
 const PLACE: u64 = 1 << 16;
 
 /// What was found in the images before the first block, and holds for all of them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Known {
     /// The disparities to search, in pixels.
     min: i32,
     max: i32,
     /// How far the right view is moved up, in 1/256 px.
     offset: i32,
-    /// Standard deviations by which the views are smoothed, in pixels.
-    smoothing: [f64; 2],
+    /// Standard deviations by which the views are smoothed, in pixels: as text, which keeps every bit.
+    smoothing: [String; 2],
 }
 
 impl Known {
     pub(crate) fn new(range: DisparityRange, corrections: Conditioning) -> Self {
         let (DisparityRange { min, max }, Conditioning { offset, smoothing, .. }) = (range, corrections);
-        Self { min, max, offset, smoothing }
+        Self { min, max, offset, smoothing: smoothing.map(|sigma| sigma.to_string()) }
     }
 
     pub(crate) fn range(&self) -> mrfgs::Result<DisparityRange> {
         DisparityRange::new(self.min, self.max)
     }
 
+    /// The corrections; none that is no number.
     pub(crate) fn corrections(&self) -> Conditioning {
         let mut known = Conditioning::default();
-        (known.offset, known.smoothing) = (self.offset, self.smoothing);
+        known.offset = self.offset;
+        known.smoothing = self.smoothing.each_ref().map(|sigma| sigma.parse().unwrap_or_default());
         known
     }
 }
@@ -63,6 +65,11 @@ pub(crate) struct Fingerprint {
 
 impl Fingerprint {
     pub(crate) fn of(path: &Path) -> Result<Self> {
+        if path.metadata().is_ok_and(|about| !about.is_file()) {
+            return Err(
+                Error::read(path, "is no file, so it cannot be matched in blocks; save it as one").into()
+            );
+        }
         let read = || -> io::Result<Self> {
             let mut file = File::open(path)?;
             let (bytes, mut crc) = (file.metadata()?.len(), Crc::new());
@@ -116,10 +123,11 @@ impl BlockFolder {
     /// # Errors
     /// If it belongs to another match, or holds something else.
     pub(crate) fn open(path: &Path, request: &impl Serialize) -> Result<Self> {
-        // Reading rounds numbers.
-        let text = files::json_text(path, request)?;
-        let request: Value = serde_json::from_str(&text).map_err(|e| Error::write(path, e.to_string()))?;
         files::folder_place(path)?;
+        let told = |e: serde_json::Error| Error::write(path, e.to_string());
+        let request = serde_json::to_value(request).map_err(told)?;
+        // Reading rounds numbers.
+        let as_read: Value = serde_json::from_str(&files::json_text(path, &request)?).map_err(told)?;
         let named = path.join(MATCH);
         let known = match fs::read(&named) {
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
@@ -139,7 +147,7 @@ impl BlockFolder {
                 let manifest: Manifest = serde_json::from_slice(&bytes).map_err(|_| {
                     Error::read(&named, "does not describe a match; remove the folder, or give another one")
                 })?;
-                if let Some(key) = difference(&manifest.request, &request) {
+                if let Some(key) = difference(&manifest.request, &as_read) {
                     let reason = format!(
                         "the folder holds blocks of another match, whose {key} differs; give another folder, or remove this one"
                     );
@@ -153,17 +161,18 @@ impl BlockFolder {
 
     /// What an earlier run has found, if there was one.
     pub(crate) fn known(&self) -> Option<Known> {
-        self.known
+        self.known.clone()
     }
 
     /// Describes the match in the folder, which then takes its `blocks`, and is created if it does not exist.
     pub(crate) fn begin(self, known: Known, blocks: &Blocks) -> Result<BlockFiles> {
         let (width, height) = blocks.size();
         let parts: Vec<Rect> = blocks.list().iter().map(|block| block.part().clone()).collect();
+        let is_new = self.known.is_none();
         let manifest = Manifest { request: self.request, known, size: [width, height], blocks: parts.len() };
         let path = self.path.join(MATCH);
         let text = files::json_text(&path, &manifest)?;
-        if self.known.is_none() {
+        if is_new {
             files::create_folder(&self.path).map_err(|e| Error::write(&self.path, e))?;
             write::save(&path, text.as_bytes())?;
         }
@@ -283,14 +292,17 @@ mod tests {
         let parent = tempfile::tempdir().unwrap();
         let path = parent.path().join("blocks");
         let range = DisparityRange::new(0, 31).unwrap();
-        let request = |name: &str| json!({ "method": name, "files": 3 });
+        let request = |name: &str| json!({ "method": name, "share": 0.1 + 0.2, "files": 3 });
         let blocks = Blocks::new((300, 200), range, &mrfgs::Method::default()).unwrap();
-        let known = Known::new(range, Conditioning::default());
+        let mut corrections = Conditioning::default();
+        (corrections.offset, corrections.smoothing) = (-77, [0.1 + 0.2, 1.0 / 3.0]);
+        let known = Known::new(range, corrections);
+        assert_eq!(known.corrections(), corrections);
         let folder = BlockFolder::open(&path, &request("a")).unwrap();
         assert_eq!(folder.known(), None);
-        let begun = folder.begin(known, &blocks).unwrap();
+        let begun = folder.begin(known.clone(), &blocks).unwrap();
         let again = BlockFolder::open(&path, &request("a")).unwrap();
-        assert_eq!(again.known(), Some(known));
+        assert_eq!(again.known(), Some(known.clone()));
         assert_eq!(again.begin(known, &blocks).unwrap().of, begun.of);
         let said = BlockFolder::open(&path, &request("b")).err().unwrap().to_string();
         assert!(said.contains("another match, whose method differs"), "{said}");

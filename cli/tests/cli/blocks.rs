@@ -199,6 +199,11 @@ fn a_folder_takes_one_match() {
         .failed(2, "mine: the folder holds other files; give a new one");
     run(&folder, &line("other.pfm", "--shard 1/2")).failed(2, "--blocks");
 
+    // What can be read once cannot be recognized by the next run.
+    #[cfg(target_os = "linux")]
+    run(&folder, &line("other.pfm", "--blocks new").replace("left.tif", "/dev/null"))
+        .failed(1, "/dev/null: is no file");
+
     // A pair that cannot be matched makes no folder.
     run(&folder, &line("other.pfm", "--blocks new").replace("right.tif", "none.tif")).failed(1, "none.tif");
     run(&folder, &line("other.pfm", "--blocks new").replace("--max-disparity 31", "--max-disparity 5000"))

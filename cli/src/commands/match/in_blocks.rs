@@ -145,8 +145,9 @@ pub(super) fn run(request: &Request) -> Result<()> {
         None => Known::new(range, stop::at_once(|| blocks.conditioning(|part| input.pair.window(part)))?),
     };
     input.pair.forget_overview();
+    let corrections = found.corrections();
     let files = folder.begin(found, &blocks)?;
-    let run = BlockRun { request, input: &input, files: &files, blocks: &blocks, known: found, prior };
+    let run = BlockRun { request, input: &input, files: &files, blocks: &blocks, corrections, prior };
     run.match_blocks(place.temporary.is_none())?;
     let complete = run.complete()?;
     if complete < files.count() {
@@ -185,7 +186,7 @@ struct BlockRun<'a> {
     input: &'a Input<LargePair>,
     files: &'a BlockFiles,
     blocks: &'a Blocks,
-    known: Known,
+    corrections: Conditioning,
     prior: Option<Arc<Prior>>,
 }
 
@@ -272,7 +273,7 @@ impl BlockRun<'_> {
         let block: &Region = &self.blocks.list()[index];
         let window = self.input.pair.window(block.window())?;
         let start = Instant::now();
-        let job = matcher.job(&window, self.input.range).conditioning(self.known.corrections());
+        let job = matcher.job(&window, self.input.range).conditioning(self.corrections);
         let job = match &self.prior {
             Some(prior) => job.prior(prior.crop(block.window())),
             None => job,
@@ -289,7 +290,7 @@ impl BlockRun<'_> {
         let (args, input, files) = (self.args(), self.input, self.files);
         let (tally, thin) = self.tally()?;
         let summary = Summary::of(self)?;
-        let corrections = self.known.corrections();
+        let corrections = self.corrections;
         if !args.quiet {
             self.say_summary(&summary, corrections);
             self.warn(&thin, summary.prior);
