@@ -18,7 +18,9 @@ use std::iter;
 const MARGIN: usize = 128;
 /// About the largest width and height of a block in pixels, so that a large pair has blocks to share, and little is lost with one of them.
 const LARGEST: usize = 4096;
-/// A pair whose tiles have fewer pixels than this many times its own is matched in tiles, which share maps, even if blocks took less time.
+/// A pair of fewer pixels than this, or whose tiles have fewer pixels than [`MOST_IN_TILES`] times its own, is matched in tiles if they fit,
+/// even if blocks took less time: tiles share maps, so their seams are better.
+const LARGE: usize = 1 << 22;
 const MOST_IN_TILES: f64 = 1.5;
 /// Samples in which corrections are measured lie in the middle of the parts of a grid with this many columns and rows.
 const SAMPLES: usize = 3;
@@ -62,8 +64,8 @@ impl Blocks {
         Ok(Self { size, list: list.collect(), reach: grid.reach, range, method: method.clone() })
     }
 
-    /// Whether a pair of (width, height) pixels is matched in blocks: if its tiles do not fit in the memory of `method`, or are so small
-    /// that they take longer than blocks.
+    /// Whether a pair of (width, height) pixels is matched in blocks: if its tiles do not fit in the memory of `method`, or, for more than
+    /// four million pixels, if they are so small that they take longer than blocks.
     ///
     /// # Errors
     /// [`Error::Option`] for options out of range.
@@ -71,7 +73,7 @@ impl Blocks {
         let whole = Plan::new(size.0, size.1, range, method)?;
         let Some(pixels) = Tiles::pixels(&whole) else { return Ok(true) };
         let share = pixels as f64 / whole.levels[0].pixels() as f64;
-        if share < MOST_IN_TILES {
+        if size.0 * size.1 < LARGE || share < MOST_IN_TILES {
             return Ok(false);
         }
         let in_tiles = share * (size.0 * size.1) as f64;
