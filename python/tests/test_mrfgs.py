@@ -2336,6 +2336,8 @@ class Processes(unittest.TestCase):
             # Control: other settings take threads of their own.
             matcher = pickle.loads(pickle.dumps(mrfgs.Matcher(device="cpu", threads=1)))
             matcher.match(*views, 15)
+            # Threads may take a moment to end.
+            time.sleep(0.5)
             counts.append(alive() - before)
             print(*counts, len(same), len({id(copy[1]) for copy in copies}))
         """, "2 2 3 1 1")
