@@ -11,6 +11,7 @@ use mrfgs::{AutoRange, Job, Matched, Matcher, Prior, check};
 
 use crate::console;
 use crate::failure::Result;
+use crate::outputs::Found;
 use crate::progress::Bar;
 use crate::remedy;
 use crate::text::plural;
@@ -96,30 +97,34 @@ pub(crate) fn run(
         if let Some(note) = &matched.note {
             console::say(&remedy::error(note, &remedy::FLAGS));
         }
-        let (width, height) = matched.maps.disparity.size();
         let name = name.map(|name| format!("{name}: ")).unwrap_or_default();
-        let (labels, iterations) = (matched.range().labels(), matched.iterations);
-        let tiles = match (matched.blocks, matched.tiles.count()) {
-            (1, 1) => String::new(),
-            (1, count) => format!(", {count} tiles"),
-            (count, _) => format!(", {count} blocks"),
-        };
-        console::say(&format!(
-            "{name}{width} x {height}, {labels} disparit{}{tiles}, {iterations} iteration{} in {:.2} s on {}",
-            if labels == 1 { "y" } else { "ies" },
-            plural(iterations as usize),
-            time.as_secs_f64(),
-            matched.ran_on
-        ));
-        let corrected = matched.conditioning.to_string();
-        if !corrected.is_empty() {
-            console::say(&format!("{name}{corrected}"));
-        }
-        if let Some(used) = matched.prior {
-            say_prior(&name, used);
-        }
+        say_summary(&name, matched.maps.disparity.size(), &Found::of(&matched), time);
     }
     Ok((matched, time))
+}
+
+/// Prints what a match of maps of this size has found; `name` is empty, or ends in `: `.
+pub(crate) fn say_summary(name: &str, (width, height): (usize, usize), found: &Found, time: Duration) {
+    let (labels, iterations) = (found.range.labels(), found.iterations);
+    let tiles = match (found.blocks, found.tiles) {
+        (1, 1) => String::new(),
+        (1, count) => format!(", {count} tiles"),
+        (count, _) => format!(", {count} blocks"),
+    };
+    console::say(&format!(
+        "{name}{width} x {height}, {labels} disparit{}{tiles}, {iterations} iteration{} in {:.2} s on {}",
+        if labels == 1 { "y" } else { "ies" },
+        plural(iterations as usize),
+        time.as_secs_f64(),
+        found.ran_on
+    ));
+    let corrected = found.conditioning.to_string();
+    if !corrected.is_empty() {
+        console::say(&format!("{name}{corrected}"));
+    }
+    if let Some(used) = found.prior {
+        say_prior(name, used);
+    }
 }
 
 /// Prints how much of a prior was used.

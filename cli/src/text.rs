@@ -48,6 +48,12 @@ pub(crate) fn wrapped(text: &str, width: usize, lead: &str) -> String {
     lines.join("\n")
 }
 
+/// The 64-bit hash FNV-1a of a text, which is the same in every release.
+pub(crate) fn fnv1a(text: &str) -> u64 {
+    text.bytes()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -34,7 +34,7 @@ pub mod check {
     pub use super::overview::{overview, range_of_overview, warnings_of_overview};
     pub use super::parts::Part;
     pub use super::range::{beyond, goes_beyond, range, range_of_cameras, wider};
-    pub use super::warnings::{Warning, damaged, of_prior, warnings, warnings_of};
+    pub use super::warnings::{Warning, damaged, warnings, warnings_of, warnings_of_match};
 }
 
 use crate::error::{Error, Purpose, Result};

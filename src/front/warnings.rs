@@ -403,9 +403,24 @@ pub fn warnings_of(maps: &Maps, range: DisparityRange, looks: u32) -> Vec<Warnin
         .collect()
 }
 
-/// The warning of a prior that the images contradict.
+/// The warnings of [`warnings_of`], and that of a `prior` that the images contradict. If sparse matches have found the range
+/// (`range_found`), disparities at its lower end are errors, since distant surfaces have sparse matches: they give no warning.
 #[must_use]
-pub fn of_prior(used: &PriorUse) -> Option<Warning> {
+pub fn warnings_of_match(
+    maps: &Maps,
+    range: DisparityRange,
+    looks: u32,
+    range_found: bool,
+    prior: Option<&PriorUse>,
+) -> Vec<Warning> {
+    let mut warnings = warnings_of(maps, range, looks);
+    warnings.retain(|w| !range_found || !matches!(w, Warning::Clipped { upper: false, .. }));
+    warnings.extend(prior.and_then(of_prior));
+    warnings
+}
+
+/// The warning of a prior that the images contradict.
+fn of_prior(used: &PriorUse) -> Option<Warning> {
     (used.trust < TRUSTED).then(|| Warning::Contradicted { percent: (100.0 * used.trust).round() as usize })
 }
 

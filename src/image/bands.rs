@@ -7,7 +7,7 @@ use tiff::{TiffError, TiffResult};
 
 use super::picture::png_or_tiff_size;
 use super::save::Growing;
-use super::write::{self, Format, Writer, check_float, is_special, png_levels};
+use super::write::{self, Format, Writer, is_special, png_levels};
 use super::{Plane, pfm, tiff as tiff_file};
 use crate::error::{Error, Result};
 
@@ -35,15 +35,6 @@ impl Writer {
             }
             Format::Tiff => self.write_tiff(path, size, bands),
         }
-    }
-
-    /// Like [`Writer::depth`], for a map of (width, height) pixels, from its bands.
-    ///
-    /// # Errors
-    /// The errors of [`Writer::depth`], and that of a band, which leaves no file.
-    pub fn depth_in_bands(&self, path: &Path, size: (usize, usize), bands: Bands<'_, f32>) -> Result<()> {
-        check_float(path)?;
-        self.disparity_in_bands(path, size, bands)
     }
 
     fn write_tiff(&self, path: &Path, size: (usize, usize), bands: Bands<'_, f32>) -> Result<()> {

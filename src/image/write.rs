@@ -148,7 +148,7 @@ pub fn picture(path: &Path, picture: &impl Picture) -> Result<()> {
     save(path, &picture.png(path)?)
 }
 
-pub(super) fn check_float(path: &Path) -> Result<()> {
+fn check_float(path: &Path) -> Result<()> {
     match format(path) {
         Ok(Format::Pfm | Format::Tiff) => Ok(()),
         _ => Err(Error::write(path, Reason::of_request("depth maps end in .pfm or .tif (float)"))),

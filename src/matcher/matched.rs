@@ -129,11 +129,8 @@ impl Matched {
     /// The likely faults of the pair or the range, from the maps, and of the prior.
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
-        let mut warnings = check::warnings_of(&self.maps, self.range(), self.plan.looks());
-        // Distant surfaces have sparse matches, so disparities at the lower end of a found range are errors.
-        warnings.retain(|w| !self.range_found || !matches!(w, Warning::Clipped { upper: false, .. }));
-        warnings.extend(self.prior.as_ref().and_then(check::of_prior));
-        warnings
+        let (looks, prior) = (self.plan.looks(), self.prior.as_ref());
+        check::warnings_of_match(&self.maps, self.range(), looks, self.range_found, prior)
     }
 }
 

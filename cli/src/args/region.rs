@@ -24,8 +24,8 @@ pub(crate) struct BlockArgs {
     /// The pair is cut into blocks of at most about 4096 x 4096 pixels, smaller ones if --memory asks for it, each matched alone with a
     /// margin. The blocks depend only on the pair, the disparities and the method, so the outputs have the same bytes on any number of
     /// machines that see FOLDER. Each block goes into a file of its own. The run that finds all of them complete writes the outputs. Remove
-    /// FOLDER then. Without --blocks, only a pair that does not fit into --memory is matched in blocks, in a folder beside OUTPUT that is
-    /// removed in the end.
+    /// FOLDER then. Without --blocks, a pair is matched in blocks only where --memory asks for it, in a folder beside OUTPUT that is removed
+    /// in the end.
     #[arg(long, value_name = "FOLDER", conflicts_with = "roi")]
     pub(crate) blocks: Option<PathBuf>,
     /// Matches only part K of N of the blocks (K from 1), such as 2/8, where machines share no file system with locks

@@ -1,5 +1,7 @@
 //! Parts of a list or of a pair, for several machines or jobs.
 
+use crate::text::fnv1a;
+
 /// Part `index` of `count`, from 0.
 #[derive(Clone, Copy)]
 pub(crate) struct Shard {
@@ -25,9 +27,7 @@ impl Shard {
 
     /// Whether the pair `name` is in this part.
     pub(crate) fn holds(self, name: &str) -> bool {
-        let hash = name
-            .bytes()
-            .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3));
+        let hash = fnv1a(name);
         (hash >> 32 ^ hash & 0xffff_ffff) % self.count == self.index
     }
 }

@@ -17,6 +17,7 @@ use serde_json::Value;
 use crate::blocks::stored::{self, BlockRecord, Rows};
 use crate::failure::Result;
 use crate::outputs::{Claim, files};
+use crate::text::fnv1a;
 
 /// The file that describes the match.
 const MATCH: &str = "match.json";
@@ -24,7 +25,7 @@ const MATCH: &str = "match.json";
 const PLACES: u64 = 16;
 const PLACE: u64 = 1 << 16;
 
-/// What was found in the images before the first block, and holds for all of them.
+/// Range and corrections of a pair, which all of its blocks share.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Known {
     /// The disparities to search, in pixels.
@@ -92,7 +93,7 @@ impl Fingerprint {
 /// The contents of `match.json`.
 #[derive(Serialize, Deserialize)]
 struct Manifest {
-    /// What the user asked for.
+    /// The images, flags and method that determine the maps.
     request: Value,
     known: Known,
     /// Width and height of the maps.
@@ -101,19 +102,12 @@ struct Manifest {
     blocks: usize,
 }
 
-/// The state of a block.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum BlockState {
-    Complete,
-    Missing,
-}
-
 /// A folder for the blocks of a match.
 pub(crate) struct BlockFolder {
     path: PathBuf,
-    /// As [`Manifest::request`].
+    /// The images, flags and method that determine the maps.
     request: Value,
-    /// What an earlier run has found.
+    /// Range and corrections that an earlier run has found; `None` for the first run.
     known: Option<Known>,
 }
 
@@ -159,7 +153,7 @@ impl BlockFolder {
         Ok(Self { path: path.to_owned(), request, known })
     }
 
-    /// What an earlier run has found, if there was one.
+    /// Range and corrections that an earlier run has found; `None` for the first run.
     pub(crate) fn known(&self) -> Option<Known> {
         self.known.clone()
     }
@@ -176,7 +170,12 @@ impl BlockFolder {
             files::create_folder(&self.path).map_err(|e| Error::write(&self.path, e))?;
             write::save(&path, text.as_bytes())?;
         }
-        Ok(BlockFiles { folder: self.path, of: identity(&text), size: (width, height), parts })
+        Ok(BlockFiles {
+            folder: self.path,
+            of: format!("{:016x}", fnv1a(&text)),
+            size: (width, height),
+            parts,
+        })
     }
 }
 
@@ -185,14 +184,6 @@ fn difference(one: &Value, other: &Value) -> Option<String> {
     let (Value::Object(one), Value::Object(other)) = (one, other) else { return Some("request".into()) };
     let keys = one.keys().chain(other.keys());
     keys.into_iter().find(|key| one.get(*key) != other.get(*key)).cloned()
-}
-
-/// 64-bit FNV-1a of a text, as a word.
-fn identity(text: &str) -> String {
-    let hash = text.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    });
-    format!("{hash:016x}")
 }
 
 /// The files of the blocks of a match.
@@ -229,12 +220,20 @@ impl BlockFiles {
         self.folder.join(Self::name(index))
     }
 
-    /// The state of block `index`.
+    /// Whether block `index` is complete.
     ///
     /// # Errors
     /// If its file is damaged, or belongs to another match.
-    pub(crate) fn state(&self, index: usize) -> mrfgs::Result<BlockState> {
-        Ok(self.rows(index)?.map_or(BlockState::Missing, |_| BlockState::Complete))
+    pub(crate) fn is_complete(&self, index: usize) -> mrfgs::Result<bool> {
+        Ok(self.rows(index)?.is_some())
+    }
+
+    /// Number of complete blocks.
+    ///
+    /// # Errors
+    /// The errors of [`Self::is_complete`].
+    pub(crate) fn complete(&self) -> mrfgs::Result<usize> {
+        (0..self.count()).try_fold(0, |count, block| Ok(count + usize::from(self.is_complete(block)?)))
     }
 
     /// The record of block `index`, which is complete.

@@ -4,6 +4,6 @@ mod folder;
 mod joined;
 mod stored;
 
-pub(crate) use folder::{BlockFiles, BlockFolder, BlockState, Fingerprint, Known};
+pub(crate) use folder::{BlockFiles, BlockFolder, Fingerprint, Known};
 pub(crate) use joined::Bands;
 pub(crate) use stored::BlockRecord;

@@ -19,7 +19,7 @@ const FIRST: &str = "mrfgs block 1\n";
 /// Longest line that describes a block, in bytes.
 const LONGEST: u64 = 1 << 16;
 
-/// What is known of a matched block beside its maps.
+/// The record of a matched block: where it lies, what it ran on, and how long it took.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct BlockRecord {
     /// The identity of the match that it belongs to.

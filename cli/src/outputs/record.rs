@@ -88,7 +88,7 @@ pub(crate) struct Found<'a> {
 }
 
 impl<'a> Found<'a> {
-    fn of(matched: &'a Matched) -> Self {
+    pub(crate) fn of(matched: &'a Matched) -> Self {
         Self {
             method: &matched.plan.method,
             range: matched.range(),

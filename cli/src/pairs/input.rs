@@ -19,8 +19,9 @@ use crate::failure::{self, Failure, Result};
 use crate::matching::SearchSpace;
 use crate::outputs::Files;
 use crate::pairs::folder::CALIBRATION;
-use crate::pairs::large::{LargePair, UnreadPair};
+use crate::pairs::large::LargePair;
 use crate::pairs::list;
+use crate::pairs::views::Views;
 use crate::remedy;
 
 /// The files of a pair, and how to read them.
@@ -84,48 +85,6 @@ impl Calib<'_> {
                 Ok(calibration::of_texts(&texts)?)
             }
         }
-    }
-}
-
-/// The views of a pair, in memory or in files.
-pub(crate) trait Views {
-    /// (width, height) in pixels.
-    fn size(&self) -> (usize, usize);
-
-    /// The range of disparities by sparse matches; `doffs` is the offset of the principal points, if that is known.
-    fn range(&self, doffs: Option<f64>) -> mrfgs::Result<DisparityRange>;
-}
-
-impl Views for Pair {
-    fn size(&self) -> (usize, usize) {
-        self.size()
-    }
-
-    fn range(&self, doffs: Option<f64>) -> mrfgs::Result<DisparityRange> {
-        match doffs {
-            Some(doffs) => check::range_of_cameras(self, doffs),
-            None => check::range(self),
-        }
-    }
-}
-
-impl Views for LargePair {
-    fn size(&self) -> (usize, usize) {
-        self.size()
-    }
-
-    fn range(&self, doffs: Option<f64>) -> mrfgs::Result<DisparityRange> {
-        self.range(doffs)
-    }
-}
-
-impl Views for UnreadPair<'_> {
-    fn size(&self) -> (usize, usize) {
-        self.size()
-    }
-
-    fn range(&self, doffs: Option<f64>) -> mrfgs::Result<DisparityRange> {
-        self.range(doffs)
     }
 }
 

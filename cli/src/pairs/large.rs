@@ -10,6 +10,8 @@ use mrfgs::image::{Georeference, Pair, Rect};
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::{Error, Result};
 
+use crate::pairs::views::Views;
+
 /// The files of a rectified pair, and how to read them.
 #[derive(Clone, Copy)]
 pub(crate) struct PairFiles<'a> {
@@ -81,14 +83,6 @@ impl LargePair {
         Self { range, ..self }
     }
 
-    /// (width, height) in pixels.
-    pub(crate) fn size(&self) -> (usize, usize) {
-        match &self.pixels {
-            Pixels::Whole(pair) => pair.size(),
-            Pixels::Files(windows) => windows.size(),
-        }
-    }
-
     /// The pixels of `part`.
     pub(crate) fn window(&self, part: &Rect) -> Result<Pair> {
         match &self.pixels {
@@ -121,17 +115,26 @@ impl LargePair {
         self.overview.take();
     }
 
-    /// The range of disparities by sparse matches of the overview; `doffs` is the offset of the principal points, if that is known.
-    pub(crate) fn range(&self, doffs: Option<f64>) -> Result<DisparityRange> {
+    /// Warnings about the pair, from its overview; `range` is that of the user, if there is one.
+    pub(crate) fn warnings(&self, range: Option<DisparityRange>) -> Result<Vec<Warning>> {
+        Ok(check::warnings_of_overview(self.overview()?, range))
+    }
+}
+
+/// The range comes from the overview.
+impl Views for LargePair {
+    fn size(&self) -> (usize, usize) {
+        match &self.pixels {
+            Pixels::Whole(pair) => pair.size(),
+            Pixels::Files(windows) => windows.size(),
+        }
+    }
+
+    fn range(&self, doffs: Option<f64>) -> Result<DisparityRange> {
         if let Some(range) = self.range {
             return Ok(range);
         }
         check::range_of_overview(self.overview()?, doffs)
-    }
-
-    /// Warnings about the pair, from its overview; `range` is that of the user, if there is one.
-    pub(crate) fn warnings(&self, range: Option<DisparityRange>) -> Result<Vec<Warning>> {
-        Ok(check::warnings_of_overview(self.overview()?, range))
     }
 }
 
@@ -148,14 +151,14 @@ impl<'a> UnreadPair<'a> {
     pub(crate) fn new(files: PairFiles<'a>, method: &'a Method, scratch: PathBuf) -> Result<Self> {
         Ok(Self { files, method, scratch, size: files.size()? })
     }
+}
 
-    /// (width, height) in pixels.
-    pub(crate) fn size(&self) -> (usize, usize) {
+impl Views for UnreadPair<'_> {
+    fn size(&self) -> (usize, usize) {
         self.size
     }
 
-    /// The range of disparities by sparse matches, as in [`LargePair::range`].
-    pub(crate) fn range(&self, doffs: Option<f64>) -> Result<DisparityRange> {
+    fn range(&self, doffs: Option<f64>) -> Result<DisparityRange> {
         LargePair::of_files(self.files.open(&self.scratch)?, self.method).range(doffs)
     }
 }

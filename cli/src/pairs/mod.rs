@@ -4,3 +4,4 @@ pub(crate) mod folder;
 pub(crate) mod input;
 pub(crate) mod large;
 pub mod list;
+pub(crate) mod views;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use mrfgs::calibration::cameras::ThirdCamera;
 use mrfgs::calibration::matrix::Matrix;
-use mrfgs::check::{self, Warning};
+use mrfgs::check;
 use mrfgs::depth::Rig;
 use mrfgs::image::{Georeference, Image, Plane, Rect, write};
 use mrfgs::low_level::plan::Plan;
@@ -24,21 +24,20 @@ use super::args::Args;
 use super::outputs::{check_outputs, record_files, say_end, write_outputs};
 use super::request::Request;
 use crate::args::{CameraArgs, CropArgs, PriorArgs, PriorView, ReadingArgs, RectificationArgs, Search, Sign};
-use crate::blocks::{Bands, BlockFiles, BlockFolder, BlockRecord, BlockState, Fingerprint, Known};
+use crate::blocks::{Bands, BlockFiles, BlockFolder, BlockRecord, Fingerprint, Known};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, Found, MatchRecord, Outcome, Tally, View, Written, files};
 use crate::pairs::input::{self, Input};
 use crate::pairs::large::LargePair;
 use crate::progress::Counter;
-use crate::text::plural;
-use crate::{console, remedy, stop};
+use crate::{console, matching, remedy, stop};
 
 /// How long to wait while other runs match the remaining blocks.
 const PATIENCE: Duration = Duration::from_millis(100);
 /// About the most pixels of the thinned maps, from which warnings come.
 const THIN: usize = 1 << 22;
 
-/// What determines the maps of all blocks.
+/// The images, flags and method that determine the maps of all blocks.
 #[derive(Serialize)]
 struct Asked<'a> {
     version: &'static str,
@@ -111,11 +110,7 @@ pub(super) fn progress(request: &Request, blocks: &Blocks) -> Result<Option<(usi
     let folder = BlockFolder::open(path, &Asked::new(request)?)?;
     let Some(known) = folder.known() else { return Ok(None) };
     let files = folder.begin(known, blocks)?;
-    let mut complete = 0;
-    for block in 0..files.count() {
-        complete += usize::from(files.state(block)? == BlockState::Complete);
-    }
-    Ok(Some((complete, files.count())))
+    Ok(Some((files.complete()?, files.count())))
 }
 
 /// Matches the pair in blocks, and writes the outputs once all are complete.
@@ -149,7 +144,7 @@ pub(super) fn run(request: &Request) -> Result<()> {
     let files = folder.begin(found, &blocks)?;
     let run = BlockRun { request, input: &input, files: &files, blocks: &blocks, corrections, prior };
     run.match_blocks(place.temporary.is_none())?;
-    let complete = run.complete()?;
+    let complete = files.complete()?;
     if complete < files.count() {
         if !args.quiet {
             console::say(&format!(
@@ -195,22 +190,13 @@ impl BlockRun<'_> {
         self.request.args
     }
 
-    /// The number of complete blocks.
-    fn complete(&self) -> Result<usize> {
-        let mut complete = 0;
-        for block in 0..self.files.count() {
-            complete += usize::from(self.files.state(block)? == BlockState::Complete);
-        }
-        Ok(complete)
-    }
-
     /// Matches every missing block of this run, unless another run does. If they are `kept`, the next run goes on after a stop.
     fn match_blocks(&self, kept: bool) -> Result<()> {
         let (args, count) = (self.args(), self.files.count());
         let mut left = VecDeque::new();
         for block in 0..count {
             let is_ours = args.blocks.shard.is_none_or(|shard| shard.holds_block(block));
-            if is_ours && self.files.state(block)? == BlockState::Missing {
+            if is_ours && !self.files.is_complete(block)? {
                 left.push_back(block);
             }
         }
@@ -243,7 +229,7 @@ impl BlockRun<'_> {
                 continue;
             };
             taken = 0;
-            if self.files.state(block)? == BlockState::Missing {
+            if !self.files.is_complete(block)? {
                 let note = match self.match_block(block, &mut matcher) {
                     Err(Failure::Stopped(_)) => return Err(self.stopped(kept)?),
                     note => note?,
@@ -264,7 +250,7 @@ impl BlockRun<'_> {
         if !kept {
             return Ok(Error::Interrupted.into());
         }
-        let (complete, count) = (self.complete()?, self.files.count());
+        let (complete, count) = (self.files.complete()?, self.files.count());
         Ok(Failure::Stopped(format!("stopped after {complete} of {count} blocks; run it again to resume")))
     }
 
@@ -290,9 +276,9 @@ impl BlockRun<'_> {
         let (args, input, files) = (self.args(), self.input, self.files);
         let (tally, thin) = self.tally()?;
         let summary = Summary::of(self)?;
-        let corrections = self.corrections;
         if !args.quiet {
-            self.say_summary(&summary, corrections);
+            let found = summary.found(self);
+            matching::say_summary("", files.size(), &found, Duration::from_secs_f64(summary.seconds));
             self.warn(&thin, summary.prior);
         }
         let template = Template {
@@ -307,7 +293,7 @@ impl BlockRun<'_> {
         let paths = record_files(args, input);
         let mut record = MatchRecord::of(
             &paths,
-            summary.found(self, corrections),
+            summary.found(self),
             files.size(),
             tally,
             Duration::from_secs_f64(summary.seconds),
@@ -410,34 +396,13 @@ impl BlockRun<'_> {
         Ok(said)
     }
 
-    fn say_summary(&self, summary: &Summary, corrections: Conditioning) {
-        let (width, height) = self.files.size();
-        let (labels, blocks) = (self.input.range.labels(), self.files.count());
-        console::say(&format!(
-            "{width} x {height}, {labels} disparit{}, {blocks} block{}, {} iteration{} in {:.2} s on {}",
-            if labels == 1 { "y" } else { "ies" },
-            plural(blocks),
-            summary.iterations,
-            plural(summary.iterations as usize),
-            summary.seconds,
-            summary.ran_on
-        ));
-        let corrected = corrections.to_string();
-        if !corrected.is_empty() {
-            console::say(&corrected);
-        }
-    }
-
     /// Prints the warnings that maps give.
     fn warn(&self, thin: &Maps, prior: Option<PriorUse>) {
         let (width, height) = self.blocks.list()[0].window().size();
         let looks =
             Plan::new(width, height, self.input.range, &self.request.method).map_or(1, |plan| plan.looks());
-        let mut warnings = check::warnings_of(thin, self.input.range, looks);
-        // As for a match in one go.
         let found = self.input.has_found_range();
-        warnings.retain(|warning| !found || !matches!(warning, Warning::Clipped { upper: false, .. }));
-        warnings.extend(prior.as_ref().and_then(check::of_prior));
+        let warnings = check::warnings_of_match(thin, self.input.range, looks, found, prior.as_ref());
         input::warn(warnings.into_iter().map(|warning| self.args().sign.warning(warning)));
     }
 }
@@ -478,7 +443,7 @@ impl Summary {
         })
     }
 
-    fn found<'a>(&'a self, run: &'a BlockRun, corrections: Conditioning) -> Found<'a> {
+    fn found<'a>(&'a self, run: &'a BlockRun) -> Found<'a> {
         Found {
             method: &run.request.method,
             range: run.input.range,
@@ -487,7 +452,7 @@ impl Summary {
             note: self.note.clone(),
             tiles: self.tiles,
             blocks: run.files.count(),
-            conditioning: corrections,
+            conditioning: run.corrections,
             prior: self.prior,
             iterations: self.iterations,
             timings: &[],

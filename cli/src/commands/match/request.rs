@@ -11,8 +11,9 @@ use super::args::Args;
 use crate::args::CameraNeed;
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, files};
-use crate::pairs::input::{Input, Views};
+use crate::pairs::input::Input;
 use crate::pairs::large::PairFiles;
+use crate::pairs::views::Views;
 
 /// The command line, checked.
 pub(super) struct Request<'a> {
