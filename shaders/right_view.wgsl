@@ -12,8 +12,9 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> belief: array<u32>;
+@group(0) @binding(2) var<storage, read> left: array<vec4<u32>>;
 // label | belief << 16; all bits are set where no left pixel projects.
-@group(0) @binding(2) var<storage, read_write> right_labels: array<u32>;
+@group(0) @binding(3) var<storage, read_write> right_labels: array<u32>;
 
 @compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -31,8 +32,9 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     for (var j = start; j < end; j++) {
         let label = u32(j);
         let b = pick(belief[row + QUAD_WORDS * u32(shift + j) + word_of(label, params.level.width)], label);
-        if b != MOST {
-            least = min(least, (b << 16u) | label);
+        let found = (b << 16u) | label;
+        if b != MOST && found < least && left[id.y * params.level.pixel_pitch + u32(shift + j)].z == 0u {
+            least = found;
         }
     }
     right_labels[id.y * params.level.pixel_pitch + id.x] = least;

@@ -585,3 +585,23 @@ fn a_plan_of_another_size_is_refused() {
         assert!(common::solve(backend.as_mut(), &plan, &pair, observer).is_err());
     }
 }
+
+/// A masked pixel of the left view is no rival for what the pixels beside it match.
+#[test]
+fn masked_pixels_occlude_nothing() {
+    let (width, height, disparity) = (160, 40, 20);
+    let texture = texture(&mut Random::new(3), width + disparity, height);
+    let crop = |x| texture.crop(&Rect { x: x..x + width, y: 0..height });
+    let mut left = crop(0);
+    left.masked = Plane::from_fn(width, height, |x, _| x < 60);
+    let pair = Pair::new(left, crop(disparity)).unwrap();
+    for preset in ["default", "fast", "fgs"] {
+        let method = Method::preset(preset).unwrap();
+        let mut matcher = Matcher::builder().method(method).device("cpu").build().unwrap();
+        let found = matcher.run(&pair, DisparityRange::new(-60, 60).unwrap()).unwrap();
+        let validity = &found.maps.validity;
+        let seen = (0..height).flat_map(|y| (65..100).map(move |x| (x, y)));
+        let occluded = seen.filter(|&at| validity[at] & flag::OCCLUDED != 0).count();
+        assert!(occluded < 35 * height / 100, "{preset}: {occluded} pixels");
+    }
+}

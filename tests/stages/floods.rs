@@ -5,7 +5,7 @@ use crate::common::devices::backends;
 use crate::common::random::{self, Random, State};
 use crate::common::twin;
 use crate::{MINIMA, on_all, resolve, same, twin_start};
-use mrfgs::image::Pair;
+use mrfgs::image::{Image, Pair};
 use mrfgs::low_level::backend::{Backend, Stage, Volume};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::graph::LevelGraph;
@@ -138,9 +138,9 @@ pub(super) fn twin_flood(
 }
 
 /// The stages after message passing that read volumes.
-fn twin_read_out(plan: &Plan, cost: &[u32], belief: &[u32], maps: &mut twin::Finest) {
+fn twin_read_out(plan: &Plan, left: &Image, cost: &[u32], belief: &[u32], maps: &mut twin::Finest) {
     twin::winner_takes_all::winner_takes_all(plan, belief, maps);
-    twin::right_view::right_view(plan, belief, maps);
+    twin::right_view::right_view(plan, left, belief, maps);
     twin::sub_pixel::sub_pixel(plan, cost, maps);
 }
 
@@ -155,7 +155,7 @@ pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
     let (costs, mut state) = twin_start(plan, pair);
     let iterations = twin_flood(plan, &graphs, &mut state, Some(&costs));
     let mut maps = twin::Finest::zero(plan.size());
-    twin_read_out(plan, &costs[0], &state.belief[0], &mut maps);
+    twin_read_out(plan, pair.left(), &costs[0], &state.belief[0], &mut maps);
     for (name, mut backend) in backends() {
         let backend = backend.as_mut();
         backend.prepare(plan, Prepared::new(pair)).unwrap();

@@ -10,6 +10,7 @@ use std::ops::Range;
 /// Computes `rows` of the right view.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     let (plan, maps, Level { belief, windows, .. }) = (&v.plan, &mut v.maps, &v.levels[0]);
+    let masked = &v.pair.left().masked;
     let (width, labels) = (plan.levels[0].width, plan.levels[0].labels);
     let names: Vec<u32> = (0..labels as u32).collect();
     let right = maps.right.rows_mut(rows.clone()).par_chunks_mut(width);
@@ -19,7 +20,7 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
         || vec![u32::MAX; width],
         |found, ((right, best), y)| {
             found.fill(u32::MAX);
-            right_row(plan, windows, y, &names, windows.row_of(belief, y), found);
+            right_row(plan, windows, y, &names, windows.row_of(belief, y), masked.row(y), found);
             for ((right, best), &found) in right.iter_mut().zip(best).zip(found.iter().rev()) {
                 (*right, *best) = (found as u16, (found >> 16) as u16);
             }
@@ -36,11 +37,12 @@ fn right_row_on<'a, S: pulp::Simd, U: Units>(
     y: usize,
     names: &'a [u32],
     row: &'a [U],
+    masked: &'a [bool],
     found: &'a mut [u32],
 ) {
     let level = &plan.levels[0];
     let width = level.width;
-    for x in plan.core.clone() {
+    for x in plan.core.clone().filter(|&x| !masked[x]) {
         let window = windows.row(y)[x];
         // Label j of left pixel x is at right pixel x - min - j.
         let place = (width - 1 - x) as i64 + i64::from(level.min);

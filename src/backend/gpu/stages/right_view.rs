@@ -8,7 +8,7 @@ use crate::error::Result;
 
 shader! {
     "right_view"(plan, level) { first_column: u32, columns: u32 }
-    main { belief, right_labels } => Variant::new(plan.levels[0].labels).of_width(plan.volume_width);
+    main { belief, left, right_labels } => Variant::new(plan.levels[0].labels).of_width(plan.volume_width);
 }
 
 /// The columns depend on the core of the tile, so each tile has its own commands.
