@@ -27,6 +27,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     writes: |z| volumes(&[Volume::Belief(z)]),
     reach: Some(GRAPH_WINDOW / 2),
     joins: true,
-    cell: 0.45,
+    cell: 0.4,
     ..Descriptor::NONE
 };

@@ -15,6 +15,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| vec![Data::Volume(Volume::Belief(0)), Data::LabelMap, Data::Convergence],
     writes: |_| vec![Data::LabelMap, Data::Convergence],
     needs: |_| vec![Data::Squares, Data::RowSums, Data::Groups],
-    cell: 0.2,
+    cell: 0.1,
     ..Descriptor::NONE
 };

@@ -14,6 +14,6 @@ use super::{Descriptor, Map, maps};
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Best, Map::RunnerUp, Map::Validity]),
     writes: |_| maps(&[Map::Confidence]),
-    pixel: 4.0,
+    pixel: 0.5,
     ..Descriptor::NONE
 };

@@ -11,6 +11,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| vec![Data::LEFT, Data::Right],
     writes: |_| volumes(&[Volume::Cost(0)]),
     needs: |_| vec![Data::LeftCensus, Data::RightCensus, Data::Contrast],
-    cell: 0.7,
+    cell: 2.3,
     ..Descriptor::NONE
 };

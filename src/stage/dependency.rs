@@ -53,6 +53,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     writes: |z| volumes(&[Volume::Dependency(z)]),
     reach: Some(GRAPH_WINDOW / 2),
     joins: true,
-    cell: 0.45,
+    cell: 0.5,
     ..Descriptor::NONE
 };

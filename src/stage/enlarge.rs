@@ -48,6 +48,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     },
     writes: |_| maps(&Map::FULL),
     taken: |plan| plan.method.schedule.match_size == MatchSize::Half,
-    pixel: 60.0,
+    pixel: 40.0,
     ..Descriptor::NONE
 };

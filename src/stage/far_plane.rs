@@ -97,6 +97,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     writes: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
     needs: |_| vec![Data::Patches],
     taken: |plan| patches::are_taken(&plan.method),
-    pixel: 8.0,
+    pixel: 14.0,
     ..Descriptor::NONE
 };

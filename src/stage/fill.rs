@@ -20,6 +20,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     writes: |_| maps(&[Map::Disparity, Map::Validity]),
     needs: |_| vec![Data::KnownRows, Data::SourceRows, Data::NextDisparity, Data::NextFlags],
     taken: |plan| plan.method.refinement.fill != Fill::None,
-    pixel: 4.0,
+    pixel: 1.0,
     ..Descriptor::NONE
 };

@@ -19,6 +19,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     writes: |_| maps(&[Map::Disparity]),
     needs: |_| vec![Data::NextDisparity],
     taken: |plan| votes::are_taken(&plan.method),
-    pixel: 48.0,
+    pixel: 95.0,
     ..Descriptor::NONE
 };

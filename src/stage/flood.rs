@@ -14,6 +14,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     },
     writes: |z| volumes(&[Volume::Dependency(z), Volume::Belief(z)]),
     joins: true,
-    cell: 0.9,
+    cell: 0.6,
     ..Descriptor::NONE
 };

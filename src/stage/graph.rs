@@ -48,6 +48,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     },
     needs: |z| vec![Data::NextGuide(z)],
     joins: true,
-    pixel: 34.0,
+    pixel: 28.0,
     ..Descriptor::NONE
 };

@@ -49,6 +49,6 @@ pub(super) const ROW: Descriptor = Descriptor {
         Some(finer) => vec![Data::Prior(finer)],
     },
     writes: |z| vec![Data::Prior(z)],
-    pixel: 4.0,
+    pixel: 1.5,
     ..Descriptor::NONE
 };

@@ -40,6 +40,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |z| vec![Data::Volume(Volume::Belief(z + 1)), Data::Windows(z + 1), Data::LabelRange(z)],
     writes: |z| vec![Data::Windows(z)],
     needs: |z| vec![Data::Candidates(z + 1)],
-    pixel: 4.0,
+    pixel: 2.0,
     ..Descriptor::NONE
 };

@@ -21,6 +21,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     writes: |_| maps(&[Map::RunnerUp]),
     reach: Some(0),
     pixel: 2.0,
-    cell: 0.1,
+    cell: 0.05,
     ..Descriptor::NONE
 };

@@ -22,6 +22,6 @@ use super::{Data, Descriptor, Map, maps};
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| [maps(&[Map::Label, Map::RightLabel]), vec![Data::LEFT]].concat(),
     writes: |_| maps(&[Map::Validity]),
-    pixel: 5.0,
+    pixel: 1.0,
     ..Descriptor::NONE
 };

@@ -23,6 +23,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     writes: |_| maps(&[Map::Disparity]),
     needs: |_| vec![Data::NextDisparity],
     taken: |plan| plan.method.refinement.median != Median::Off && !plan.method.refinement.plane,
-    pixel: 60.0,
+    pixel: 110.0,
     ..Descriptor::NONE
 };

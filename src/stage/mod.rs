@@ -42,6 +42,9 @@ macro_rules! for_every_stage {
     };
 }
 
+/// Approximate share of the labels in the windows of a level that follow beliefs.
+const KEPT: f64 = 0.35;
+
 /// Properties of a stage that hold for every backend.
 pub struct Descriptor {
     /// Data that it reads at a level; those that do not exist there are skipped.
@@ -242,8 +245,13 @@ impl Stage {
     /// Approximate time on one thread, in ns.
     #[must_use]
     pub fn work(self, plan: &Plan) -> f64 {
-        let level = &plan.levels[self.level().unwrap_or(0)];
+        let z = self.level().unwrap_or(0);
+        let level = &plan.levels[z];
         let &Descriptor { pixel, cell, .. } = self.descriptor();
-        pixel * level.pixels() as f64 + cell * level.cells() as f64
+        // Costs are computed for all labels, what follows only within the label windows.
+        let windowed = plan.windows_follow_beliefs(z)
+            && self.volumes(plan).any(|volume| volume.level() == z && volume != Volume::Cost(z));
+        let cells = if windowed { KEPT } else { 1.0 } * level.cells() as f64;
+        pixel * level.pixels() as f64 + cell * cells
     }
 }

@@ -60,6 +60,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     writes: |_| maps(&[Map::Disparity]),
     needs: |_| vec![Data::NextDisparity],
     taken: |plan| plan.method.refinement.median != Median::Off && plan.method.refinement.plane,
-    pixel: 90.0,
+    pixel: 220.0,
     ..Descriptor::NONE
 };

@@ -73,6 +73,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |z| vec![Data::Volume(Volume::Evidence(z)), Data::Windows(z), Data::Prior(z)],
     writes: |z| volumes(&[Volume::Evidence(z), Volume::Belief(z)]),
     reach: Some(0),
-    cell: 0.5,
+    cell: 0.15,
     ..Descriptor::NONE
 };

@@ -25,6 +25,6 @@ use super::{Descriptor, Volume, volumes};
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |z| volumes(&[Volume::Cost(z - 1)]),
     writes: |z| volumes(&[Volume::Cost(z)]),
-    cell: 4.9,
+    cell: 2.5,
     ..Descriptor::NONE
 };

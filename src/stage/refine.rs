@@ -72,6 +72,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| [maps(&[Map::Label]), vec![Data::FullLeft, Data::FullRight]].concat(),
     writes: |_| maps(&[Map::Raw, Map::Disparity]),
     needs: |_| vec![Data::FullLeftCensus, Data::FullRightCensus, Data::BlockCosts],
-    pixel: 90.0,
+    pixel: 60.0,
     ..Descriptor::NONE
 };

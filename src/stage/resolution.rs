@@ -52,6 +52,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     writes: |z| volumes(&[Volume::Down(z - 1), Volume::Up(z)]),
     reach: Some(0),
     joins: true,
-    cell: 0.5,
+    cell: 4.0,
     ..Descriptor::NONE
 };

@@ -19,6 +19,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     writes: |_| maps(&[Map::Validity]),
     needs: |_| vec![Data::Parents, Data::Sizes],
     taken: |plan| plan.method.refinement.speckle_size > 0,
-    pixel: 15.0,
+    pixel: 2.0,
     ..Descriptor::NONE
 };

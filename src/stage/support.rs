@@ -20,6 +20,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
     writes: |_| maps(&[Map::Confidence, Map::Validity]),
     needs: |_| vec![Data::NextFlags],
-    pixel: 10.0,
+    pixel: 14.0,
     ..Descriptor::NONE
 };

@@ -17,6 +17,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| vec![Data::Volume(Volume::Belief(0)), Data::Windows(0)],
     writes: |_| maps(&[Map::Label, Map::Best, Map::RunnerUp]),
     reach: Some(0),
-    cell: 0.2,
+    cell: 0.25,
     ..Descriptor::NONE
 };
