@@ -57,6 +57,9 @@ interface Read extends Pair {
     generation: number;
 }
 
+/** A pair with its name, the prefix of saved files. */
+type Loaded = Read & { name: string };
+
 /** State of the page; tests wait for it. */
 type State = 'starting' | 'empty' | 'loading' | 'ready' | 'matching' | 'comparing' | 'done' | 'failed';
 
@@ -104,8 +107,7 @@ let facts: Facts | undefined;
 /** Undefined until checked. */
 let gpu: boolean | undefined;
 let view: View = 'disparity';
-/** `name` is the prefix of saved files. */
-let pair: (Read & { name: string }) | undefined;
+let pair: Loaded | undefined;
 /** The user's choice of rectification; undefined leaves it to the calibration. `failed` if rectification by matches failed. */
 let rectify: Rectifier | 'nothing' | 'failed' | undefined;
 /** Likely problems of the pair and the range before a match. */
@@ -218,13 +220,12 @@ async function read(matched: boolean): Promise<void> {
         signal.throwIfAborted();
         if (left && right) {
             mustFit(left, right);
-            pair = { ...(await open(signal, left, right)), name: slots.name ?? left.name };
-            points.pair(pair.left.width, pair.left.height, pair.cameras, pair.files);
-            settings.pair(pair.size.width, pair.size.height);
-            slots.show('left', pair.left);
-            slots.show('right', pair.right);
-            void showView();
-            await findRange(signal);
+            pair = await take(signal, left, right);
+            if (byHand()) {
+                rectify = 'matches';
+                found = undefined;
+                pair = await take(signal, left, right);
+            }
             remarks.note(pair.notes, pair.by !== undefined);
         }
     } catch (error) {
@@ -234,10 +235,30 @@ async function read(matched: boolean): Promise<void> {
         forget();
         refuse(error, left?.name ?? '', right?.name ?? '');
     }
-    be(idle());
-    if (matched && pair) {
+    // A pair of the user's is matched as soon as it can be.
+    if (pair && (matched || slots.scene === undefined) && range()) {
         await match(gpu === undefined ? { ...FIRST, preset: settings.chosen ?? FIRST.preset } : settings);
+    } else {
+        be(idle());
     }
+}
+
+/** Reads two views, shows them, and determines the range. */
+async function take(signal: AbortSignal, left: Opened, right: Opened): Promise<Loaded> {
+    const mine = (pair = { ...(await open(signal, left, right)), name: slots.name ?? left.name });
+    points.pair(mine.left.width, mine.left.height, mine.cameras, mine.files);
+    settings.pair(mine.size.width, mine.size.height);
+    slots.show('left', mine.left);
+    slots.show('right', mine.right);
+    void showView();
+    await findRange(signal);
+    return mine;
+}
+
+/** Whether the pair seems to have been taken by hand, and the user has not said how to rectify it. */
+function byHand(): boolean {
+    const unfound = settings.automatic && !found;
+    return rectify === undefined && slots.scene === undefined && slots.calibration.length === 0 && (unfound || suspicions.some(({ remedy }) => remedy === 'rectify'));
 }
 
 /** Throws if the views do not form a pair, or are too large, before they are read. */

@@ -33,7 +33,7 @@ export class Remarks {
     note(notes: string[], rectified: boolean, short = false): void {
         const lines = notes.map((text) => make('li', {}, `${sentence(text)}. `));
         if (rectified) {
-            lines[0]?.append(button('Take the images as they are', () => this.help.asTheyAre()));
+            lines[0]?.append(button('Undo rectification', () => this.help.asTheyAre()));
         }
         if (short) {
             const full = button('Match at full size', () => this.help.atFullSize());

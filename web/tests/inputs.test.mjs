@@ -56,7 +56,7 @@ describe('inputs', () => {
             copyFileSync(LEFT, at(left));
             copyFileSync(RIGHT, at(right));
             for (const order of [[left, right], [right, left]]) {
-                assert.equal(await visit.changed(() => visit.choose('left', ...order.map(at))), 'ready');
+                assert.equal(await visit.changed(() => visit.choose('left', ...order.map(at))), 'done');
                 assert.deepEqual(await visit.names(), [left, right]);
             }
         }
@@ -68,7 +68,7 @@ describe('inputs', () => {
             for (const order of [pair, [...pair].reverse()]) {
                 // Both files are the same, so that neither order is better.
                 const files = order.map((name) => ({ name, path: LEFT }));
-                assert.equal(await visit.changed(() => visit.give('dropped', files)), 'ready');
+                assert.equal(await visit.changed(() => visit.give('dropped', files)), 'done');
                 assert.deepEqual(await visit.names(), order);
             }
         }
@@ -81,7 +81,7 @@ describe('inputs', () => {
             assert.equal(await visit.changed(() => visit.give(way, [{ name: 'my right.png', path: RIGHT }])), 'empty');
             assert.deepEqual(await visit.names(), ['my right.png', 'choose a file']);
             assert.match(await visit.text('#pair-note'), /my right\.png begins a new pair/);
-            assert.equal(await visit.changed(() => visit.give(way, [{ name: 'my left.png', path: LEFT }])), 'ready');
+            assert.equal(await visit.changed(() => visit.give(way, [{ name: 'my left.png', path: LEFT }])), 'done');
             assert.deepEqual(await visit.names(), ['my left.png', 'my right.png']);
             assert.equal(await visit.text('#pair-note'), '');
             // The calibration belonged to the previous pair.
@@ -97,10 +97,10 @@ describe('inputs', () => {
         await visit.pair(scene('thin'), join(scene('thin'), 'calib.txt'));
         copyFileSync(LEFT, at('new left.png'));
         copyFileSync(RIGHT, at('new right.png'));
-        assert.equal(await visit.changed(() => visit.choose('left', at('new left.png'))), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', at('new left.png'))), 'done');
         assert.equal(await visit.text('#pair-note'), 'im1.png is still the right view, and calib.txt the calibration.');
         assert.match(await visit.text('#range-found'), /by calib\.txt$/);
-        assert.equal(await visit.changed(() => visit.choose('right', at('new right.png'))), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('right', at('new right.png'))), 'done');
         assert.equal(await visit.text('#pair-note'), '');
         assert.match(await visit.text('#range-found'), /by sparse matches$/);
         // A slot takes precedence over the names.
@@ -155,16 +155,30 @@ describe('inputs', () => {
         const [left, right, calib] = [[LEFT, 'b10.png'], [RIGHT, 'b9.png'], [join(scene('thin'), 'calib.txt'), 'calib.txt']].map(([path, name]) => ({ path, name }));
         // In any order, with files that operating systems create.
         const files = [{ name: 'Thumbs.db', path: LEFT }, right, calib, { name: '.hidden.png', path: LEFT }, left];
-        assert.equal(await visit.changed(() => visit.give('dropped', [{ folder: 'Some', files }])), 'ready');
+        assert.equal(await visit.changed(() => visit.give('dropped', [{ folder: 'Some', files }])), 'done');
         assert.deepEqual(await visit.names(), ['b9.png', 'b10.png']);
         await visit.says('#range-found', /by calib\.txt$/);
         // Each view in its own folder, with the same name.
         const two = [LEFT, RIGHT].map((path, i) => ({ folder: `image_${i}`, files: [{ name: '000010.png', path }] }));
-        assert.equal(await visit.changed(() => visit.give('dropped', two)), 'ready');
+        assert.equal(await visit.changed(() => visit.give('dropped', two)), 'done');
         await visit.match({ preset: 'fast', device: 'cpu', range: [0, 31] });
         const map = await visit.save('pfm');
         assert.equal(map.name, '000010-disparity.pfm');
         assert.equal(difference(map.bytes, expected.pfm), undefined);
+        // A benchmark: its folders have many frames, and not all of them views.
+        const frames = (path, ...names) => names.map((name) => ({ name, path }));
+        const deeper = [
+            { folder: 'image_3', files: frames(RIGHT, '000001_10.png', '000000_11.png', '000000_10.png') },
+            { folder: 'disp_occ_0', files: frames(RIGHT, '000000_10.png') },
+            { folder: 'image_2', files: frames(LEFT, '000000_10.png', '000001_10.png') },
+        ];
+        assert.equal(await visit.changed(() => visit.give('dropped', [{ folder: 'kitti', files: [{ folder: 'training', files: deeper }] }])), 'done');
+        assert.deepEqual(await visit.names(), ['000000_10.png', '000000_10.png']);
+        await visit.match({ preset: 'fast', device: 'cpu', range: [0, 31] });
+        assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
+        // One folder in another.
+        assert.equal(await visit.changed(() => visit.give('dropped', [{ folder: 'all', files: [{ folder: 'Some', files }] }])), 'done');
+        assert.deepEqual(await visit.names(), ['b9.png', 'b10.png']);
         await works();
     });
 
@@ -184,7 +198,7 @@ describe('inputs', () => {
 
     it('swaps the views', async () => {
         await visit.pair(scene('thin'));
-        assert.equal(await visit.changed(() => visit.tab.click('#swap')), 'ready');
+        assert.equal(await visit.changed(() => visit.tab.click('#swap')), 'done');
         assert.deepEqual(await visit.names(), ['im1.png', 'im0.png']);
         await visit.match({ preset: 'fast', device: 'cpu', range: [-31, 0] });
         const swapped = native(RIGHT, LEFT, ['--method', 'fast', '--min-disparity', '-31', '--max-disparity', '0']);
@@ -198,7 +212,7 @@ describe('inputs', () => {
     for (const way of ['dropped', 'pasted']) {
         it(`takes ${way} files`, async () => {
             const files = [RIGHT, LEFT].map((path, i) => ({ name: `im${1 - i}.png`, path }));
-            assert.equal(await visit.changed(() => visit.give(way, files)), 'ready');
+            assert.equal(await visit.changed(() => visit.give(way, files)), 'done');
             assert.deepEqual(await visit.names(), ['im0.png', 'im1.png']);
             await works();
         });
@@ -224,7 +238,7 @@ describe('inputs', () => {
         assert.equal(await other.$eval('#right-problem', (p) => p.textContent), '');
         await (await other.$('#left-file')).uploadFile(LEFT);
         await other.waitForFunction(() => document.getElementById('left-problem').textContent === '');
-        await other.waitForSelector('#app[data-state=ready]');
+        await other.waitForSelector('#app[data-state=done]');
         await other.close();
         // Pages in the background draw no frames.
         await visit.tab.bringToFront();

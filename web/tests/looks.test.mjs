@@ -123,6 +123,7 @@ describe('looks', () => {
 
     it('shows the map before behind the divider', async () => {
         const option = () => visit.tab.$eval('#behind option[value=before]', ({ disabled, textContent }) => [disabled, textContent]);
+        await visit.pair(scene('mixed'), join(scene('mixed'), 'calib.txt'));
         assert.deepEqual(await option(), [true, 'Map before']);
         const left = await canvas('under');
         await visit.match({ preset: 'fast' });
@@ -236,7 +237,6 @@ describe('looks', () => {
     it('says why there is no length where the cameras are a guess', async () => {
         // Typed cameras are kept only for pairs of the same size.
         await visit.pair(scene('slanted'));
-        await visit.match({ preset: 'fast' });
         assert.equal(await visit.tab.$eval('#behind option[value=before]', ({ disabled }) => disabled), true);
         await visit.tab.click('#measure');
         await click([50, 100]);

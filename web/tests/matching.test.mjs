@@ -52,7 +52,7 @@ describe('a match', () => {
             await visit.set({ device, preset: device === 'cpu' ? 'paper' : 'default', range: 'automatic' });
             await visit.begin();
             await visit.tab.click('#cancel');
-            await visit.state('ready');
+            await visit.state('done');
             await visit.says('#problem', /^Stopped\.$/);
             await visit.match({ preset: 'default' });
             assert.equal(await visit.text('#problem'), '');

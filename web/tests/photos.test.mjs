@@ -106,7 +106,7 @@ describe('photos', () => {
             }
             writeFileSync(at(`im${i}.webp`), webp);
         }
-        assert.equal(await visit.changed(() => visit.choose('left', at('im0.webp'), at('im1.webp'))), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', at('im0.webp'), at('im1.webp'))), 'done');
         await matches();
         assert.match(await visit.text('#facts'), /^320 × 240/);
     });
@@ -122,7 +122,7 @@ describe('photos', () => {
         const wanted = disparities(native(at('part0.png'), at('part1.png'), flags).pfm);
         for (const type of ['avif', 'gif']) {
             const files = ['im0', 'im1'].map((name) => join(ROOT, 'web/tests/files', `${name}.${type}`));
-            assert.equal(await visit.changed(() => visit.choose('left', ...files)), 'ready', type);
+            assert.equal(await visit.changed(() => visit.choose('left', ...files)), 'done', type);
             const found = disparities(await matches());
             assert.deepEqual([found.width, found.height], [width, height]);
             const places = Array.from({ length: width * height }, (_, i) => [i % width, Math.floor(i / width)]);
@@ -137,7 +137,7 @@ describe('photos', () => {
             writeFileSync(at(`turned${i}.jpg`), turned(await recoded(path, 'image/jpeg', true), 6));
         }
         const files = ['turned0.jpg', 'turned1.jpg'].map(at);
-        assert.equal(await visit.changed(() => visit.choose('left', ...files)), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', ...files)), 'done');
         const map = await matches();
         assert.match(await visit.text('#facts'), /^320 × 240/);
         assert.doesNotMatch(await visit.text('#warnings'), /turned|column/);
@@ -146,7 +146,7 @@ describe('photos', () => {
 
     it('cuts an image that holds both views, side by side', async () => {
         writeFileSync(at('both.png'), joined(true));
-        assert.equal(await visit.changed(() => visit.choose('left', at('both.png'))), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', at('both.png'))), 'done');
         await visit.says('#pair-note', /left and right half/);
         assert.equal(difference(await matches(), expected.pfm), undefined);
         assert.equal((await visit.save('pfm')).name, 'both-disparity.pfm');
@@ -156,7 +156,7 @@ describe('photos', () => {
         const [left, right] = await Promise.all(VIEWS.map((path) => recoded(path, 'image/jpeg')));
         writeFileSync(at('camera.mpo'), mpo(left, right));
         [left, right].forEach((view, i) => writeFileSync(at(`mpo${i}.jpg`), view));
-        assert.equal(await visit.changed(() => visit.choose('left', at('camera.mpo'))), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', at('camera.mpo'))), 'done');
         await visit.says('#pair-note', /holds both views/);
         assert.deepEqual(await visit.names(), ['camera left.jpg', 'camera right.jpg']);
         const map = await matches();
@@ -182,7 +182,7 @@ describe('photos', () => {
         ];
         for (const [name, bytes, note] of files) {
             writeFileSync(at(name), bytes);
-            assert.equal(await visit.changed(() => visit.choose('left', at(name))), 'ready', name);
+            assert.equal(await visit.changed(() => visit.choose('left', at(name))), 'done', name);
             await visit.says('#pair-note', note);
             const there = disparities(native(at(name), undefined, flags).pfm);
             const here = disparities(await matches());
@@ -195,7 +195,7 @@ describe('photos', () => {
 
     it('cuts one with a view above the other, by guess and by button', async () => {
         writeFileSync(at('stack.png'), joined(false));
-        assert.equal(await visit.changed(() => visit.choose('left', at('stack.png'))), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', at('stack.png'))), 'done');
         await visit.says('#pair-note', /upper half/);
         assert.equal(difference(await matches(), expected.pfm), undefined);
         // Wide views on top of each other are not portrait; similar halves are split in any shape.
@@ -204,7 +204,7 @@ describe('photos', () => {
             PNG.bitblt(PNG.sync.read(readFileSync(join(scene('border'), file))), wide, 0, 0, 240, 67, 0, 67 * i);
         });
         writeFileSync(at('wide.png'), PNG.sync.write(wide));
-        assert.equal(await visit.changed(() => visit.choose('left', at('wide.png'))), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', at('wide.png'))), 'done');
         await visit.says('#pair-note', /upper half/);
         // A single view is left as it is, and a button splits it.
         await visit.scene('thin');
@@ -224,7 +224,7 @@ describe('photos', () => {
             writeFileSync(at(`large${i}.png`), PNG.sync.write(to));
         }
         const files = ['large0.png', 'large1.png'].map(at);
-        assert.equal(await visit.changed(() => visit.choose('left', ...files)), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', ...files)), 'done');
         await visit.match({ preset: 'fgs', device: 'cpu', range: [0, 600] });
         assert.match(await visit.text('#facts'), /^640 × 480 pixels · at half size/);
         const half = native(...files, ['--method', 'fgs', '--max-disparity', '600', '--set', 'match-size=half']);
@@ -237,7 +237,7 @@ describe('photos', () => {
         const size = () => visit.tab.$eval('#size', (select) => select.value);
         assert.equal(await size(), 'full');
         // The setting applied to that pair only.
-        assert.equal(await visit.changed(() => visit.choose('left', ...VIEWS)), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', ...VIEWS)), 'done');
         assert.equal(await size(), 'automatic');
     });
 
@@ -246,7 +246,7 @@ describe('photos', () => {
         const files = names.map((name) => ({ name, path: join(scene('thin'), name) }));
         const drop = () => visit.give('dropped', [{ folder: 'Motorcycle', files }]);
         await visit.set({ range: 'automatic' });
-        assert.equal(await visit.changed(drop), 'ready');
+        assert.equal(await visit.changed(drop), 'done');
         assert.equal(await visit.text('#pair-note'), 'Of 5 files im0.png and im1.png are the views.');
         await visit.says('#range-found', /^0 to 31 px, by calib\.txt$/);
         await visit.match({ preset: 'fast', device: 'cpu', range: 'automatic' });

@@ -89,19 +89,24 @@ describe('remedies', () => {
         assert.equal(difference((await visit.save('pfm')).bytes, native(join(folder, 'im1.png'), join(folder, 'im0.png'), FAST).pfm), undefined);
     });
 
-    it('rectifies by matches, and takes the images as they are', async () => {
-        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'ready');
-        await visit.says('#warnings', /not rectified/);
-        await again(() => click('#warnings', 'Rectify'));
+    it('rectifies a pair by its matches where they are not on one row, and undoes it', async () => {
+        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'done');
         assert.match(await visit.text('#notes'), /Rectified by its own matches, without a scale: \d+ of \d+ matches agree/);
         assert.doesNotMatch(await visit.text('#warnings'), /not rectified/);
+        assert.equal(await visit.text('#pair-problem'), '');
         assert.equal(difference((await visit.save('pfm')).bytes, native(...RAW, [...FAST, '--rectify']).pfm), undefined);
-        assert.equal(await visit.changed(() => click('#notes', 'Take the images as they are')), 'ready');
+        assert.equal(await visit.changed(() => click('#notes', 'Undo rectification')), 'ready');
         assert.doesNotMatch(await visit.text('#notes'), /Rectified/);
         await visit.says('#warnings', /not rectified/);
+        await visit.says('#range-problem', /^Sparse matches find no range/);
+        // Match leads to the button.
+        await visit.tab.click('#match');
+        await visit.tab.waitForFunction(() => document.activeElement.id === 'rectify');
+        await again(() => click('#warnings', 'Rectify'));
+        assert.match(await visit.text('#notes'), /Rectified by its own matches/);
     });
 
-    it('rectifies a pair without a range where it says so, and swaps it as it is', async () => {
+    it('rectifies a pair without a range before it asks for one, and swaps it as it is', async () => {
         await visit.set({ range: 'automatic' });
         const [left, right] = views('mixed');
         const from = PNG.sync.read(readFileSync(right));
@@ -111,13 +116,7 @@ describe('remedies', () => {
         const [one, other] = ['by hand left.png', 'by hand right.png'].map((name) => join(folder, name));
         copyFileSync(left, one);
         writeFileSync(other, PNG.sync.write(to));
-        assert.equal(await visit.changed(() => visit.choose('left', one, other)), 'ready');
-        await visit.says('#range-problem', /^Sparse matches find no range/);
-        await visit.says('#no-range', /by hand/);
-        // Match leads to the button.
-        await visit.tab.click('#match');
-        await visit.tab.waitForFunction(() => document.activeElement.id === 'rectify');
-        await again(() => visit.tab.click('#rectify'));
+        assert.equal(await visit.changed(() => visit.choose('left', one, other)), 'done');
         assert.match(await visit.text('#notes'), /Rectified by its own matches/);
         assert.equal(await visit.tab.$eval('#no-range', (offer) => offer.checkVisibility()), false);
         assert.equal(await visit.text('#range-problem'), '');
@@ -134,9 +133,8 @@ describe('remedies', () => {
         await visit.set({ range: 'automatic' });
         const [one, other] = [views('thin')[0], views('steep')[1]];
         assert.equal(await visit.changed(() => visit.give('dropped', [one, other].map((path, i) => ({ name: `im${i}.png`, path })))), 'ready');
-        await visit.says('#no-range', /by hand/);
-        assert.equal(await visit.changed(() => visit.tab.click('#rectify')), 'ready');
         await visit.says('#pair-problem', /cannot be rectified without a calibration/);
+        await visit.says('#range-problem', /^Sparse matches find no range/);
         assert.equal(await visit.tab.$eval('#no-range', (offer) => offer.checkVisibility()), false);
         await visit.match({ range: [0, 31] });
         const offered = () => visit.tab.$$eval('#warnings button, #notes button', (buttons) => buttons.map((button) => button.textContent));
@@ -145,8 +143,9 @@ describe('remedies', () => {
         await visit.says('#range-problem', /find no range/);
         assert.equal(await visit.tab.$eval('#no-range', (offer) => offer.checkVisibility()), false);
         // The failure concerned that pair.
-        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'done');
         assert.equal(await visit.text('#pair-problem'), '');
+        assert.equal(await visit.changed(() => click('#notes', 'Undo rectification')), 'ready');
         assert.ok((await offered()).includes('Rectify'));
         // Also with a known range. The engine is given a pair that it cannot rectify.
         await visit.set({ range: [0, 31] });
@@ -167,7 +166,7 @@ describe('remedies', () => {
         await visit.scene('mixed');
         await visit.choose('left', CAMERAS);
         await visit.says('#pair-note', /cameras\.yml is kept/);
-        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'done');
         await visit.says('#notes', /Rectified by cameras\.yml/);
         await visit.match({ range: 'automatic' });
         await visit.says('#notes', /Rectified by cameras\.yml/);
@@ -194,12 +193,12 @@ describe('remedies', () => {
             assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
         };
         for (const order of [['lenses.yml', 'pose.yml'], ['pose.yml', 'lenses.yml'], ['other.yml', 'pose.yml', 'lenses.yml']]) {
-            assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'ready');
+            assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'done');
             for (const name of order.slice(0, -1)) {
                 assert.equal(await give(name), 'ready');
                 await visit.says('#pair-problem', /\w/);
             }
-            assert.equal(await give(order.at(-1)), 'ready');
+            assert.equal(await give(order.at(-1)), 'done');
             await rectified(/Rectified by (lenses\.yml, pose\.yml|pose\.yml, lenses\.yml)\b/);
         }
         // Three of them, the lens of the right camera first, and before their pair.
@@ -208,10 +207,10 @@ describe('remedies', () => {
             await visit.choose('left', join(folder, name));
             await visit.says('#pair-note', new RegExp(name.replace('.', '\\.')));
         }
-        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'done');
         await rectified(/Rectified by lens left\.yml, pose\.yml, lens right\.yml/);
         // A whole one takes the place of all.
-        assert.equal(await visit.changed(() => visit.choose('left', CAMERAS)), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', CAMERAS)), 'done');
         await rectified(/Rectified by cameras\.yml/);
     });
 
@@ -220,7 +219,7 @@ describe('remedies', () => {
         const sized = (name, size) => writeFileSync(join(folder, name), text.replace('[ 240, 180 ]', size));
         sized('larger.yml', '[ 480, 360 ]');
         sized('wider.yml', '[ 320, 180 ]');
-        assert.equal(await visit.changed(() => visit.choose('left', ...RAW, join(folder, 'larger.yml'))), 'ready');
+        assert.equal(await visit.changed(() => visit.choose('left', ...RAW, join(folder, 'larger.yml'))), 'done');
         await visit.says('#notes', /Rectified by larger\.yml.*larger\.yml: is for images of 480 x 360.*count as the same, scaled/i);
         assert.equal(await visit.changed(() => visit.choose('left', ...RAW, join(folder, 'wider.yml'))), 'ready');
         await visit.says('#pair-problem', /wider\.yml: .*320 x 180.*240 x 180/);

@@ -294,7 +294,7 @@ describe('views', () => {
         writeFileSync(file, Buffer.concat([Buffer.from(`P5 ${width} ${height} 65535\n`), grey]));
         await (await other.$('#left-file')).uploadFile(file);
         await (await other.$('#right-file')).uploadFile(file);
-        await other.waitForFunction(() => document.querySelector('#left canvas:not([hidden])'));
+        await other.waitForFunction(() => /tall/.test(document.querySelector('#right .name').textContent) && document.querySelector('#left canvas:not([hidden])'));
         const seen = await other.$eval('#left canvas', (canvas) => {
             const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
             const mean = data.reduce((sum, value, i) => sum + (i % 4 === 0 ? value : 0), 0) / (data.length / 4);

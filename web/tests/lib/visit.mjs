@@ -221,7 +221,7 @@ export class Visit {
     /** Chooses the views of a folder, and further files. */
     async pair(folder, ...also) {
         const state = await this.changed(() => this.choose('left', join(folder, 'im0.png'), join(folder, 'im1.png'), ...also));
-        assert.equal(state, 'ready', await this.text('#pair-problem'));
+        assert.equal(state, 'done', await this.text('#pair-problem'));
     }
 
     /** Opens a rendered scene, which is matched. */
