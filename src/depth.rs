@@ -5,14 +5,15 @@
 //! (cx1 - cx0). Depth has the unit of the baseline.
 
 use crate::calibration::cameras::{Pose, ThirdCamera};
+use crate::calibration::lens::{Distortion, Lens};
 use crate::calibration::matrix::{Matrix, rotated, transposed};
 use crate::error::{Error, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
 use crate::image::cloud::{Cloud, Point, PointFrame};
 use crate::image::{Image, Plane};
-use crate::maps::{FRACTION, Maps};
+use crate::maps::{FRACTION, Maps, flag};
 use crate::options::MAX_DISPARITY;
-use crate::prior::{Prior, PriorPoint};
+use crate::prior::{Prior, PriorKind, PriorPoint};
 use crate::registration;
 
 /// A calibrated pair of cameras, rectified.
@@ -114,10 +115,42 @@ impl Rig {
     #[must_use]
     pub fn seen(&self, point: [f64; 3]) -> Option<[f64; 3]> {
         let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.camera;
-        let from_original = self.to_original.filter(|_| self.frame == PointFrame::Original);
-        let [x, y, z] = from_original.map_or(point, |matrix| rotated(&transposed(&matrix), point));
+        let [x, y, z] = self.in_matched_frame(point);
         let seen = [x * fx / z + cx, y * fy / z + cy, self.disparity(z)];
         (z > 0.0 && seen.iter().all(|v| v.is_finite())).then_some(seen)
+    }
+
+    /// Rotates a point from the frame of [`Rig::point`] to that of the rectified left camera.
+    fn in_matched_frame(&self, point: [f64; 3]) -> [f64; 3] {
+        let from_original = self.to_original.filter(|_| self.frame == PointFrame::Original);
+        from_original.map_or(point, |matrix| rotated(&transposed(&matrix), point))
+    }
+
+    /// What the maps of a frame tell of the left view after the rig has moved: their measured disparities as a surface, drawn where the rig
+    /// sees it then. `motion` takes points from the frame of [`Rig::point`] before the motion into that after it, in the unit of the
+    /// baseline. Of several surfaces the nearest counts, and nothing is known of what the maps do not show.
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] for a focal length that no camera has.
+    pub fn prior_after(&self, maps: &Maps, motion: &Pose) -> Result<Prior> {
+        let size @ (width, height) = maps.disparity.size();
+        let measured = Plane::from_fn(width, height, |x, y| {
+            let is_known = maps.validity[(x, y)] & flag::INVALID == 0;
+            if is_known { maps.disparity[(x, y)] as f32 / FRACTION as f32 } else { f32::INFINITY }
+        });
+        let Camera { focal_length, principal_point } = self.camera;
+        let lens = Lens::new(focal_length, principal_point, Distortion::NONE)?;
+        let camera = ThirdCamera { lens, pose: *motion, size, unit: self.unit };
+        let depths = registration::render(&measured, &camera, |x, y, d| {
+            Some(self.in_matched_frame(motion.moved(self.point(x, y, d)?)))
+        });
+        let disparities = depths.map(|&depth| {
+            let disparity = self.disparity(depth.into()) as f32;
+            let is_known = depth.is_finite() && disparity.abs() <= MAX_DISPARITY as f32;
+            if is_known { disparity } else { f32::INFINITY }
+        });
+        let kind = PriorKind::Surface;
+        Prior::map(kind, &disparities, kind.usual_sigma())
     }
 
     /// What is known of a left view of (width, height) pixels that shows these points, which are in the frame of [`Rig::point`] and in the
@@ -248,7 +281,7 @@ fn whole(millimetres: f64) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::maps::flag;
+    use crate::calibration::matrix::IDENTITY;
 
     fn calibration() -> Calibration {
         Calibration {
@@ -320,6 +353,35 @@ mod tests {
                 [[1.0, 1.0, 0.0], [1.0, 1.0, -5.0], [f64::NAN; 3]].map(|point| rig.seen(point)),
                 [None; 3]
             );
+        }
+    }
+
+    #[test]
+    fn a_surface_is_known_where_the_rig_sees_it_after_a_motion() {
+        // A far wall, and one at half its depth in front, at 0 ..= 1 columns; the last pixel has not been measured.
+        let rig = Rig::new(&Calibration { doffs: Some(0.0), ..calibration() }).unwrap();
+        let maps = Maps {
+            disparity: Plane::from_fn(8, 1, |x, _| FRACTION * if x < 2 { 16 } else { 8 }),
+            raw: Plane::filled(8, 1, 0),
+            confidence: Plane::filled(8, 1, 0),
+            validity: Plane::from_fn(8, 1, |x, _| if x == 7 { flag::OCCLUDED } else { 0 }),
+            right: None,
+        };
+        let turn = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        // The same motion, in the frame of the matched camera, and of one that was turned upright.
+        for (rig, left) in [(rig, [-1.0, 0.0, 0.0]), (rig.in_original_frame(&turn), [0.0, -1.0, 0.0])] {
+            let seen = |way: f64| -> Vec<_> {
+                let motion = Pose { rotation: IDENTITY, translation: left.map(|v| v * way) };
+                let prior = rig.prior_after(&maps, &motion).unwrap();
+                (0..8)
+                    .map(|x| (prior.sigma[(x, 0)] > 0).then(|| prior.disparity[(x, 0)] / FRACTION))
+                    .collect()
+            };
+            let known =
+                |values: &[i32]| -> Vec<_> { values.iter().map(|d| (*d > 0).then_some(*d)).collect() };
+            assert_eq!(seen(0.0), known(&[16, 16, 8, 8, 8, 8, 8, 0]));
+            // By a quarter of the baseline to the right: what is near moves twice as far, by 4 px, and hides what is behind.
+            assert_eq!(seen(-160.0 / 4.0), known(&[0, 0, 0, 0, 16, 16, 8, 8]));
         }
     }
 

@@ -191,6 +191,45 @@ impl Prior {
         Self::of_map(kind, disparity, |at| sigma[at].into())
     }
 
+    /// Like [`Self::map`], for a left view of (width, height) pixels whose map may have another size, if it has the same shape. The
+    /// disparities are in pixels of the view. The value of a pixel of the map counts in all of its area, or of points in the middle of it.
+    ///
+    /// # Errors
+    /// The errors of [`Self::map`], and [`Error::Mismatch`] for a map of another shape.
+    pub fn resized(
+        kind: PriorKind,
+        disparity: &Plane<f32>,
+        size @ (width, height): (usize, usize),
+        sigma: f64,
+    ) -> Result<Self> {
+        let (w, h) = disparity.size();
+        if (w, h) == size {
+            return Self::map(kind, disparity, sigma);
+        }
+        // Of the same shape, within a pixel of the smaller one.
+        if (w * height).abs_diff(h * width) > width.max(height) {
+            return Err(Error::Mismatch(format!(
+                "it has {w} x {h} pixels and the left view {width} x {height}; give a map of the left view, or of the same shape in another \
+                 size"
+            )));
+        }
+        if kind == PriorKind::Surface {
+            let of = |x: usize, y: usize| {
+                disparity[((2 * x + 1) * w / (2 * width), (2 * y + 1) * h / (2 * height))]
+            };
+            return Self::map(kind, &Plane::from_fn(width, height, of), sigma);
+        }
+        let middle = |i: usize, own: usize, count: usize| (i as f64 + 0.5) * own as f64 / count as f64 - 0.5;
+        let all = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).filter(|at| disparity[*at].is_finite());
+        let point = |(x, y): (usize, usize)| PriorPoint {
+            x: middle(x, width, w),
+            y: middle(y, height, h),
+            disparity: disparity[(x, y)].into(),
+            sigma,
+        };
+        Self::points(size, all.map(point))
+    }
+
     fn of_map(
         kind: PriorKind,
         disparity: &Plane<f32>,

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 type Target = fn(&[u8]);
 
 /// Every target, named after its folder.
-const TARGETS: [(&str, Target); 7] = [
+const TARGETS: [(&str, Target); 9] = [
     ("pfm", targets::pfm),
     ("calib", targets::calib),
     ("cameras", targets::cameras),
@@ -20,6 +20,8 @@ const TARGETS: [(&str, Target); 7] = [
     ("list", targets::list),
     ("recording", targets::recording),
     ("config", targets::config),
+    ("scan", targets::scan),
+    ("pose", targets::pose),
 ];
 
 /// The files of a target's corpus.

@@ -2,10 +2,11 @@
 //!
 //! A file is either read, with all invariants, or refused with one line that fits a screen.
 
-use mrfgs::calibration;
+use mrfgs::calibration::{self, pose};
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::pfm::{self, Pfm};
 use mrfgs::image::read::Reader;
+use mrfgs::image::read_cloud;
 use mrfgs::options::{DisparityRange, Method, PRESETS};
 use mrfgs::rectification::{Options, Rectification};
 use mrfgs::{Error, Result};
@@ -169,6 +170,31 @@ pub fn config(bytes: &[u8]) {
             let mut method = before.clone();
             let changed = told(method.set(key.trim(), value.trim()));
             kept(&method, changed);
+        }
+    }
+}
+
+/// A point cloud in any form: what has no mark of its own is a scan of KITTI or a text, by its name.
+pub fn scan(bytes: &[u8]) {
+    for name in ["scan.bin", "scan.xyz"] {
+        let Some(points) = told(read_cloud::positions_in_memory(Path::new(name), bytes.to_vec())) else {
+            continue;
+        };
+        assert!(!points.is_empty());
+        assert!(points.as_flattened().iter().all(|v| v.is_finite()));
+    }
+}
+
+/// The pose of a point cloud.
+pub fn pose(bytes: &[u8]) {
+    let text = String::from_utf8_lossy(bytes);
+    let Some(pose) = told(pose::of_text(Path::new("pose"), &text)) else { return };
+    assert!(pose.translation.iter().all(|v| v.is_finite()));
+    let rows = pose.rotation;
+    for i in 0..3 {
+        for j in 0..3 {
+            let product: f64 = (0..3).map(|k| rows[i][k] * rows[j][k]).sum();
+            assert!((product - f64::from(u8::from(i == j))).abs() < 1e-6, "{rows:?}");
         }
     }
 }

@@ -32,6 +32,7 @@ mod realsense;
 mod ros;
 mod syntax;
 pub mod third;
+pub mod trajectory;
 pub mod write;
 mod zed;
 

@@ -41,8 +41,12 @@ pub mod ply;
 pub mod raster;
 #[cfg(feature = "files")]
 pub mod read;
-#[cfg(feature = "clouds")]
+#[cfg(feature = "cameras")]
 pub mod read_cloud;
+#[cfg(feature = "clouds")]
+mod read_pcd;
+#[cfg(feature = "cameras")]
+mod read_ply;
 #[cfg(feature = "files")]
 mod save;
 #[cfg(feature = "cameras")]

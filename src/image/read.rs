@@ -220,6 +220,14 @@ impl Reader {
         self.map(path, &load(path, self.max_pixels)?, Some(scale))
     }
 
+    /// Like [`Reader::scaled_disparity`], from a file in memory, with its name for errors.
+    ///
+    /// # Errors
+    /// The errors of [`Reader::scaled_disparity`].
+    pub fn scaled_disparity_in_memory(self, name: &Path, bytes: &[u8], scale: f32) -> Result<Plane<f32>> {
+        self.map(name, bytes, Some(scale))
+    }
+
     fn map(self, path: &Path, bytes: &[u8], scale: Option<f32>) -> Result<Plane<f32>> {
         fn scaled<S: Sample>(values: &[S], scale: f32) -> Vec<f32> {
             let disparity = |v: f64| if v == 0.0 { f32::INFINITY } else { v as f32 / scale };

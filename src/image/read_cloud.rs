@@ -1,14 +1,19 @@
-//! Reads the positions of point clouds: the feature `clouds`.
+//! Reads the positions of point clouds. PCD, LAS and LAZ need the feature `clouds`.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek};
+#[cfg(feature = "clouds")]
+use std::io::SeekFrom;
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
+#[cfg(feature = "clouds")]
+use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 
+#[cfg(feature = "clouds")]
 use ::las::Reader as LasReader;
-use pcd_rs::{DynReader, Field};
-use ply_rs_bw::parser::{Parser, Reader as PlyReader};
-use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
+#[cfg(feature = "clouds")]
+use super::read_pcd;
+use super::read_ply;
 use crate::error::{Error, Result};
 use crate::text::one_line;
 
@@ -16,25 +21,40 @@ use crate::text::one_line;
 const START: usize = 512;
 /// Bytes of a point in the scans of KITTI: x, y, z and the reflectance, each a float of 32 bits.
 const KITTI_POINT: usize = 16;
-/// Points of LAS that are read at once.
-const LAS_POINTS: u64 = 1 << 16;
+/// The number of the record of a LAZ file that says how its points are packed.
+#[cfg(feature = "clouds")]
+const LAZ_RECORD: u64 = 22_204;
+/// Bytes of LAS points that are read at once, unpacked.
+#[cfg(feature = "clouds")]
+const LAS_BYTES: u64 = 1 << 22;
 
 /// The positions (x, y, z) of the points in a file, without those that are not finite, in the unit of the file.
 ///
-/// The form is found by the first bytes: PLY, PCD and LAS or LAZ of all kinds. Otherwise a file that ends in `.bin` is a scan of KITTI, and
-/// any other file is a text whose lines begin with x, y and z, after a comment (`#`) perhaps; in COLMAP's `points3D.txt` they come after a
-/// number.
+/// The form is found by the first bytes: PLY, and with the feature `clouds` PCD and LAS or LAZ, of all kinds. Otherwise a file that ends
+/// in `.bin` is a scan of KITTI, and any other file is a text whose lines begin with x, y and z, after a comment (`#`) perhaps; in COLMAP's
+/// `points3D.txt` they come after a number.
 ///
 /// # Errors
 /// [`Error::Read`] when the file cannot be read, is damaged, or holds no points.
 pub fn positions(path: &Path) -> Result<Vec<[f64; 3]>> {
-    let mut file = BufReader::new(File::open(path).map_err(|e| Error::opening(path, e))?);
+    found(path, BufReader::new(File::open(path).map_err(|e| Error::opening(path, e))?))
+}
+
+/// Like [`positions`], from a file in memory, with its name for errors and its extension.
+///
+/// # Errors
+/// The errors of [`positions`].
+pub fn positions_in_memory(name: &Path, bytes: Vec<u8>) -> Result<Vec<[f64; 3]>> {
+    found(name, Cursor::new(bytes))
+}
+
+fn found(path: &Path, mut file: impl BufRead + Seek + Send + Sync + 'static) -> Result<Vec<[f64; 3]>> {
     let mut start = Vec::new();
     let read = file.by_ref().take(START as u64).read_to_end(&mut start).and_then(|_| file.rewind());
     read.map_err(|e| Error::opening(path, e))?;
     let is_bin = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("bin"));
     let found = if start.starts_with(b"ply") {
-        of_ply(file)
+        read_ply::positions(file)
     } else if start.starts_with(b"LASF") {
         of_las(file)
     } else if is_pcd(&start) {
@@ -59,52 +79,24 @@ fn reason(error: impl std::fmt::Display) -> String {
     format!("damaged: {}", one_line(&error.to_string()))
 }
 
-/// A point of PLY. Properties other than the position are ignored.
-struct PlyPoint([f64; 3]);
-
-impl PropertyAccess for PlyPoint {
-    fn new() -> Self {
-        Self([f64::NAN; 3])
+#[cfg(feature = "clouds")]
+fn of_las(mut file: impl BufRead + Seek + Send + Sync + 'static) -> Found {
+    if !can_be_unpacked(&mut file).unwrap_or(false) {
+        return Err("damaged: its header does not say how its points are packed".into());
     }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let value = match property {
-            Property::Char(v) => v.into(),
-            Property::UChar(v) => v.into(),
-            Property::Short(v) => v.into(),
-            Property::UShort(v) => v.into(),
-            Property::Int(v) => v.into(),
-            Property::UInt(v) => v.into(),
-            Property::Float(v) => v.into(),
-            Property::Double(v) => v,
-            _ => return PropertyAccessResult::Ignored,
-        };
-        let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == name) else {
-            return PropertyAccessResult::Ignored;
-        };
-        self.0[axis] = value;
-        PropertyAccessResult::Set
-    }
+    // The decoder of LAZ panics on some damaged files. It owns the file, so nothing is left half done.
+    let read = panic::catch_unwind(AssertUnwindSafe(|| of_sound_las(file)));
+    read.unwrap_or_else(|_| Err("damaged: its points cannot be unpacked".into()))
 }
 
-/// Reads the element `vertex`, and what comes before it.
-fn of_ply(file: impl BufRead) -> Found {
-    let (parser, mut reader) = (Parser::<PlyPoint>::new(), PlyReader::new(file));
-    let header = parser.read_header(&mut reader).map_err(reason)?;
-    for (name, element) in &header.elements {
-        let read = parser.read_payload_for_element(&mut reader, element, &header).map_err(reason)?;
-        if name == "vertex" {
-            return Ok(read.into_iter().map(|point| point.0).collect());
-        }
-    }
-    Err("is a PLY file without points (the element vertex)".into())
-}
-
-fn of_las(file: impl BufRead + Seek + Send + Sync + 'static) -> Found {
+#[cfg(feature = "clouds")]
+fn of_sound_las(file: impl BufRead + Seek + Send + Sync + 'static) -> Found {
     let mut reader = LasReader::new(file).map_err(reason)?;
+    // A file may claim that its points are large.
+    let at_once = (LAS_BYTES / u64::from(reader.header().point_format().len()).max(1)).max(1);
     let mut points = Vec::new();
     loop {
-        let read = reader.read_points(LAS_POINTS).map_err(reason)?;
+        let read = reader.read_points(at_once).map_err(reason)?;
         if read.is_empty() {
             return Ok(points);
         }
@@ -112,41 +104,64 @@ fn of_las(file: impl BufRead + Seek + Send + Sync + 'static) -> Found {
     }
 }
 
+/// Whether a LAS file is not packed, or says how: it has the fields of its points, and a table of at most as many chunks as the file has
+/// bytes, since the memory for the table is taken first. Leaves the file at its start.
+#[cfg(feature = "clouds")]
+fn can_be_unpacked(file: &mut (impl Read + Seek)) -> std::io::Result<bool> {
+    let mut word = [0; 8];
+    let length = file.seek(SeekFrom::End(0))?;
+    let mut at = |place: u64| {
+        file.seek(SeekFrom::Start(place))?;
+        file.read_exact(&mut word)?;
+        Ok::<_, std::io::Error>(u64::from_le_bytes(word))
+    };
+    // Where the points begin, and whether they are packed.
+    let start = at(96)? as u32;
+    let fits = at(104)? & 0x80 == 0 || {
+        // The place of the table is at the end where the writer could not go back.
+        let first = at(start.into())?;
+        let is_place = |place: u64| place > start.into() && place < length;
+        let place = if is_place(first) { first } else { at(length - 8)? };
+        let has_chunks = !is_place(place) || at(place)? >> 32 <= length;
+        // The records after the header, of which one lists the fields.
+        let (mut record, count) = (at(94)? & 0xffff, at(100)? as u32);
+        let mut has_fields = true;
+        for _ in 0..count {
+            let about = at(record + 14)?;
+            let (kind, size) = (about >> 32 & 0xffff, about >> 48);
+            if kind == LAZ_RECORD {
+                has_fields &= at(record + 54 + 32)? & 0xffff > 0;
+            }
+            record += 54 + size;
+        }
+        has_chunks && has_fields
+    };
+    file.rewind()?;
+    Ok(fits)
+}
+
+/// Without the feature `clouds`.
+#[cfg(not(feature = "clouds"))]
+fn of_las(_: impl BufRead) -> Found {
+    Err("is LAS, which is not read here; give PLY or a text of points".into())
+}
+
+#[cfg(feature = "clouds")]
+fn of_pcd(file: impl BufRead) -> Found {
+    read_pcd::positions(file)
+}
+
+/// Without the feature `clouds`.
+#[cfg(not(feature = "clouds"))]
+fn of_pcd(_: impl BufRead) -> Found {
+    Err("is PCD, which is not read here; give PLY or a text of points".into())
+}
+
 /// Whether a header of PCD follows, after comments.
 fn is_pcd(start: &[u8]) -> bool {
     let text = String::from_utf8_lossy(start);
     let first = text.lines().find(|line| !line.starts_with('#'));
     first.is_some_and(|line| ["VERSION", "FIELDS"].iter().any(|word| line.starts_with(word)))
-}
-
-fn of_pcd(file: impl BufRead) -> Found {
-    let reader = DynReader::from_reader(file).map_err(reason)?;
-    let fields = &reader.meta().field_defs.fields;
-    let place = |axis: &str| fields.iter().position(|field| field.name == axis && field.count == 1);
-    let (Some(x), Some(y), Some(z)) = (place("x"), place("y"), place("z")) else {
-        return Err("is a PCD file without the fields x, y and z".into());
-    };
-    let read = reader.map(|record| {
-        let record = record.map_err(reason)?;
-        Ok([x, y, z].map(|i| record.0.get(i).and_then(number).unwrap_or(f64::NAN)))
-    });
-    read.collect()
-}
-
-/// The first value of a field.
-fn number(field: &Field) -> Option<f64> {
-    match field {
-        Field::I8(v) => v.first().map(|v| (*v).into()),
-        Field::I16(v) => v.first().map(|v| (*v).into()),
-        Field::I32(v) => v.first().map(|v| (*v).into()),
-        Field::I64(v) => v.first().map(|v| *v as f64),
-        Field::U8(v) => v.first().map(|v| (*v).into()),
-        Field::U16(v) => v.first().map(|v| (*v).into()),
-        Field::U32(v) => v.first().map(|v| (*v).into()),
-        Field::U64(v) => v.first().map(|v| *v as f64),
-        Field::F32(v) => v.first().map(|v| (*v).into()),
-        Field::F64(v) => v.first().copied(),
-    }
 }
 
 fn of_kitti(mut file: impl Read) -> Found {
@@ -188,6 +203,7 @@ fn of_text(file: impl BufRead) -> Found {
     Ok(points)
 }
 
+#[cfg(feature = "clouds")]
 #[cfg(test)]
 mod tests {
     use super::super::cloud::{Cloud, Point};
@@ -231,9 +247,31 @@ mod tests {
         let faces = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
         let mesh =
             [header.as_bytes(), faces.as_bytes(), &big, &[3, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1]].concat();
+        // Two elements come before the points, and a list stands between their axes.
+        let header = "ply\r\nformat binary_little_endian 1.0\r\nobj_info x\r\nelement none 9999999999\r\nelement strip 2\r\n\
+            property list int short at\r\nproperty uint8 x\r\nelement vertex 2\r\nproperty int8 x1\r\nproperty double x\r\n\
+            property list uchar float64 w\r\nproperty double y\r\nproperty double z\r\nend_header\r\n";
+        let double = |v: f64| v.to_le_bytes();
+        let strips = [&[2, 0, 0, 0, 7, 7, 7, 7, 9][..], &[0xff, 0xff, 0xff, 0xff, 9]].concat();
+        let vertex =
+            |[x, y, z]: [f64; 3]| [&[5][..], &double(x), &[1], &double(8.0), &double(y), &double(z)].concat();
+        let lists = [header.as_bytes(), &strips, &vertex(POINTS[0]), &vertex(POINTS[1])].concat();
+        // Axes of several types between fields that are left out, one of two values; and columns that LZF packs.
+        let header = "VERSION 0.7\nFIELDS a x y b z\nSIZE 8 8 1 2 4\nTYPE F F I U F\nCOUNT 1 1 1 2 1\nWIDTH 2\nHEIGHT 1\nDATA binary\n";
+        let point = |x: f64, y: i8, z: f32| {
+            [&double(9.0)[..], &double(x), &y.to_le_bytes(), &[7; 4], &z.to_le_bytes()].concat()
+        };
+        let integers = [header.as_bytes(), &point(1.5, -2, 3.25), &point(0.0, 4, 8.5)].concat();
+        let header = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA binary_compressed\n";
+        let columns = [1.5_f32, 0.0, -2.0, 4.0, 3.25, 8.5].map(f32::to_le_bytes).concat();
+        // 4 literal bytes, 4 zeros as a literal and three that repeat it, and the rest as it is.
+        let mut lzf = [&[3][..], &columns[..4], &[0, 0], &[1 << 5, 0], &[15], &columns[8..]].concat();
+        lzf.splice(0..0, [lzf.len() as u32, 24].map(u32::to_le_bytes).concat());
+        let packed = [header.as_bytes(), &lzf].concat();
         let scan = [1.5_f32, -2.0, 3.25, 0.5, 0.0, 4.0, 8.5, 0.25].map(f32::to_le_bytes).concat();
         for (name, bytes) in [
             ("mesh.ply", &mesh[..]),
+            ("lists.ply", &lists),
             (
                 "text.ply",
                 b"ply\nformat ascii 1.0\nelement vertex 2\nproperty uchar red\nproperty double z\nproperty float y\nproperty float x\nend_header\n7 3.25 -2 1.5\n7 8.5 4 0\n",
@@ -242,6 +280,8 @@ mod tests {
                 "text.pcd",
                 b"# .PCD v.7\nVERSION .7\nFIELDS intensity x y z\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 3\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 3\nDATA ascii\n1 1.5 -2 3.25\n1 nan nan nan\n1 0 4 8.5\n",
             ),
+            ("integers.pcd", &integers),
+            ("packed.pcd", &packed),
             ("000000.bin", &scan),
             ("text.xyz", b"# a comment\n1.5 -2 3.25 255 0 0\n\n0 4 8.5 255 0 0\n"),
             ("text.xyz", b"x,y,z\n1.5,-2,3.25\n0,4,8.5\n"),
@@ -259,13 +299,23 @@ mod tests {
     fn files_without_points_are_refused() {
         let cut = &ply::encode(&cloud())[..250];
         let las = &las::encode(&cloud(), true).unwrap();
+        let header = &b"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 1\nDATA "[..];
         for (name, bytes, word) in [
             ("a.ply", cut, "damaged"),
             ("a.ply", b"ply\nformat ascii 1.0\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n", "vertex"),
-            ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 999999999\nproperty float x\nend_header\n", "damaged"),
+            ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 999999999\nproperty float x\nend_header\n", "lack x, y or z"),
+            ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 999999999\nproperty int x\nproperty int y\nproperty int z\nend_header\n1 2 3\n", "point 2 of 999999999 is missing"),
+            ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nend_header\n1 2\n", "damaged: point 1"),
+            ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty word x\nend_header\n1\n", "line 4"),
+            ("a.ply", b"ply\nelement vertex 0\nend_header\n", "`format`"),
+            ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\n", "line 4"),
             ("a.laz", &las[..las.len() / 2], "damaged"),
             ("a.pcd", b"VERSION 0.7\nFIELDS a\nSIZE 4\nTYPE F\nCOUNT 1\nWIDTH 1\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 1\nDATA ascii\n1\n", "x, y and z"),
             ("a.pcd", b"VERSION 0.7\nFIELDS x y z\nnonsense\n", "damaged"),
+            ("a.pcd", &[header, b"binary\n0123456789ab"].concat(), "point 2 of 2 is missing"),
+            ("a.pcd", &[header, b"ascii\n1 2 3\n1 2\n"].concat(), "point 2 of 2"),
+            ("a.pcd", &[header, b"binary_compressed\n\x04\0\0\0\x18\0\0\0\x3f\x40\0\0"].concat(), "unpacked"),
+            ("a.pcd", &[header, b"words\n"].concat(), "DATA"),
             ("a.bin", &[0; 17], "16 bytes"),
             ("a.xyz", b"1 2 3\n1 2\n", "line 2"),
             ("a.xyz", b"", "no points"),

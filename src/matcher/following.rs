@@ -1,8 +1,9 @@
-//! Frames of cameras that stand still: the map of each is known before the next.
+//! Frames that follow from each other: the map of each is known before the next.
 
 use super::corrections::Corrections;
 use super::{Frame, Matched, Matcher, Request};
 use crate::error::Result;
+use crate::maps::Maps;
 use crate::plan::Plan;
 use crate::prior::Prior;
 use crate::watch::{Observer, goes_on};
@@ -27,6 +28,22 @@ impl Matcher {
         pollster::block_on(self.run_following_async(frames, cancel, take))
     }
 
+    /// Like [`Matcher::run_following`], for cameras that move: `known` tells from the maps of each frame what is known of the next, such as
+    /// [`Rig::prior_after`](crate::depth::Rig::prior_after).
+    ///
+    /// # Errors
+    /// The errors of [`Matcher::run_following`] and of `known`.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn run_knowing(
+        &mut self,
+        frames: impl IntoIterator<Item = impl Into<Frame>>,
+        cancel: &AtomicBool,
+        known: impl FnMut(&Maps) -> Result<Option<Prior>>,
+        take: impl FnMut(Matched) -> ControlFlow<()>,
+    ) -> Result<()> {
+        pollster::block_on(self.follow(frames, cancel, known, take))
+    }
+
     /// Like `run_following`, for a browser.
     ///
     /// # Errors
@@ -35,6 +52,16 @@ impl Matcher {
         &mut self,
         frames: impl IntoIterator<Item = impl Into<Frame>>,
         cancel: &AtomicBool,
+        take: impl FnMut(Matched) -> ControlFlow<()>,
+    ) -> Result<()> {
+        self.follow(frames, cancel, |maps| Ok(Some(Prior::of_maps(maps))), take).await
+    }
+
+    async fn follow(
+        &mut self,
+        frames: impl IntoIterator<Item = impl Into<Frame>>,
+        cancel: &AtomicBool,
+        mut known_next: impl FnMut(&Maps) -> Result<Option<Prior>>,
         mut take: impl FnMut(Matched) -> ControlFlow<()>,
     ) -> Result<()> {
         let method = &self.method.clone();
@@ -50,7 +77,7 @@ impl Matcher {
             let prior = prior.or_else(|| last.take().filter(|last| last.size() == pair.size()));
             let request = Request { range, method, known, prior: prior.as_ref() };
             let matched = self.solve(&pair, request, &mut *observer, None).await?;
-            last = Some(Arc::new(Prior::of_maps(&matched.maps)));
+            last = known_next(&matched.maps)?.map(Arc::new);
             if take(matched).is_break() {
                 break;
             }

@@ -1,6 +1,6 @@
-// Files of what is known of the left view beforehand: lists of points, and disparity maps.
+// Files of what is known of the left view beforehand: lists of points, point clouds, and maps of disparities or depths.
 
-import type { Named } from './dropped';
+import { type Named, TEXT } from './dropped';
 import { header } from './header';
 
 /** The start of a list that is looked at, in bytes. */
@@ -8,7 +8,11 @@ const START = 4096;
 /** A point of a list: x, y, disparity, and perhaps the standard deviation. */
 const POINT = /^("?[-+.\deE]+"?\s*(,\s*|$)){3,4}$/;
 /** Names that say what a map is for. Others may be views, or the truth in a folder of a benchmark. */
-const NAMED = /prior|known|lidar/i;
+const NAMED = /prior|known|lidar|depth/i;
+/** Names of point clouds, except in a folder, where they may be the truth. */
+const CLOUD = /\.(ply|xyz)$/i;
+/** How an array of NumPy begins, after its first byte. */
+const NUMPY = 'NUMPY';
 
 /** Whether a text is a list of points, perhaps below a line with names. */
 async function isList(file: Blob): Promise<boolean> {
@@ -21,11 +25,19 @@ async function listed({ file, name }: Named, inFolder: boolean): Promise<boolean
     return /\.csv$/i.test(name) && !inFolder ? true : /\.(csv|txt)$/i.test(name) && isList(file);
 }
 
-/** Whether a file is a map, by its name and its header. */
-const mapped = async ({ file, name }: Named): Promise<boolean> => NAMED.test(name) && ((await header(file))?.map ?? false);
+/** Whether a file is an array of NumPy. */
+async function isArray(file: Blob): Promise<boolean> {
+    return (await file.slice(1, 1 + NUMPY.length).text()) === NUMPY;
+}
+
+/** Whether a file is a map, by its name and its header. Depths in a folder may be the truth. */
+async function mapped({ file, name }: Named, inFolder: boolean): Promise<boolean> {
+    const isNamed = NAMED.test(name) && !(inFolder && /depth/i.test(name));
+    return isNamed && (((await header(file))?.map ?? false) || isArray(file));
+}
 
 /**
- * The file of what is known among these, if there is one, and the others. A map counts beside two other files, or alone if the pair is
+ * The file of what is known among these, if there is one, and the others. A map counts beside two views, or as the only image if the pair is
  * `complete`; else it may be a view.
  */
 export async function apart(files: Named[], inFolder: boolean, complete: boolean): Promise<{ prior: Named | undefined; others: Named[] }> {
@@ -35,8 +47,10 @@ export async function apart(files: Named[], inFolder: boolean, complete: boolean
         return files.filter((_, i) => found[i]);
     };
     const lists = await those((file) => listed(file, inFolder));
-    const maps = files.length > 2 || (files.length === 1 && complete) ? await those(mapped) : [];
-    const [prior, second] = [...lists, ...(maps.length === 1 ? maps : [])];
+    const clouds = inFolder ? [] : files.filter(({ name }) => CLOUD.test(name));
+    const images = files.filter((file) => !lists.includes(file) && !clouds.includes(file) && !TEXT.test(file.name));
+    const maps = images.length > 2 || (images.length === 1 && complete) ? await those((file) => mapped(file, inFolder)) : [];
+    const [prior, second] = [...lists, ...clouds, ...(maps.length === 1 ? maps : [])];
     if (prior && second) {
         throw new Error(`${prior.name} and ${second.name} are both of what is known: give one of them.`);
     }

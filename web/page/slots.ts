@@ -3,7 +3,7 @@
 import { type Halves, both } from './both';
 import { cut, decoded, guess, views } from './decode';
 import { by, count, make, say, words } from './dom';
-import { type Named, dropped, named } from './dropped';
+import { type Named, TEXT, dropped, named } from './dropped';
 import { type Header, header, isHeif } from './header';
 import { inOrder, ordered } from './order';
 import { apart } from './prior';
@@ -74,8 +74,6 @@ const keeping = (files: Text[]): string => `${listed(files)} is kept for your pa
 /** The files that a calibration may have. */
 const MOST = 3;
 const READS = 'PNG, JPEG, WebP, AVIF, GIF, PNM, TIFF or PFM';
-/** Files that may be a calibration. */
-const TEXT = /\.(txt|ya?ml|json|xml|ini|conf|cfg|calib|toml)$/i;
 /** Other files in the folders of benchmarks. */
 const OTHER = /^(disp|mask|readme|license|\.)|GT\b|\.(pfm|py|md)$/i;
 

@@ -145,12 +145,15 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
     calibration(files, width, height) {
         return using(known(files), (all) => {
             const found = all.rectified ? all.ofRectified(width, height) : undefined;
-            return found && using(found, (of) => ({
-                range: of.labels ? { min: 0, max: of.labels - 1 } : undefined,
-                size: of.width && of.height ? { width: of.width, height: of.height } : undefined,
-                cameras: told(of.cameras()),
-                notes: of.doubts(width),
-            }));
+            return found && using(found, (of) => {
+                need(pair, 'pair').takenBy(of);
+                return {
+                    range: of.labels ? { min: 0, max: of.labels - 1 } : undefined,
+                    size: of.width && of.height ? { width: of.width, height: of.height } : undefined,
+                    cameras: told(of.cameras()),
+                    notes: of.doubts(width),
+                };
+            });
         });
     },
     async rectify(files) {

@@ -25,6 +25,8 @@ pub struct StereoPair {
     pub(crate) by: Option<By>,
     /// Horizontal distance of the principal points in pixels, if a calibration has rectified the pair.
     pub(crate) doffs: Option<f64>,
+    /// The cameras, if they are known, with points in the frame of the left camera that took the image.
+    pub(crate) rig: Option<Rig>,
     /// What is known of the left view.
     pub(crate) prior: Option<Arc<Prior>>,
 }
@@ -119,7 +121,7 @@ impl StereoPair {
 impl StereoPair {
     /// A pair of which nothing else is known, perhaps rectified.
     pub(crate) fn of(pair: Pair, by: Option<By>) -> Self {
-        Self { pair, by, doffs: None, prior: None }
+        Self { pair, by, doffs: None, rig: None, prior: None }
     }
 }
 

@@ -4,9 +4,10 @@ use crate::Thrown;
 use crate::object::object;
 use crate::pair::StereoPair;
 use crate::words::thrown;
-use mrfgs::error::{Error, Result};
-use mrfgs::image::Plane;
+use mrfgs::depth::Rig;
+use mrfgs::error::{Error, ReadError, Result};
 use mrfgs::image::read::Reader;
+use mrfgs::image::{Plane, read_cloud};
 use mrfgs::prior::{Prior, PriorKind, PriorPoint, PriorUse};
 use std::path::Path;
 use std::sync::Arc;
@@ -67,15 +68,20 @@ impl StereoPair {
         self.know(known())
     }
 
-    /// Takes what a file knows of the left view, and tells its kind and the number of pixels that it knows. The file is a disparity map of
-    /// the size of the view, or a list of points if its name ends in .csv or .txt.
+    /// Takes what a file knows of the left view, and tells its kind and the number of pixels that it knows. The file is one of these:
+    ///
+    /// - a list of points in the view, `.csv` or `.txt`,
+    /// - a point cloud, `.ply` or `.xyz`, in the unit of the baseline and in the frame of the left camera as it took the image,
+    /// - a map of depths, if its name has the word "depth": whole numbers in millimetres, others in metres,
+    /// - a disparity map.
+    ///
+    /// A map has the shape of the view. Clouds and depths need the cameras.
     ///
     /// # Errors
-    /// If the file is neither, or does not fit the view.
+    /// If the file is none of these, does not fit the view, or lacks the cameras.
     #[wasm_bindgen(js_name = "knowFile")]
-    pub fn know_file(&mut self, bytes: &[u8], name: &str) -> Thrown<JsValue> {
-        let size = self.pair.size();
-        let known = of_file(size, bytes, Path::new(name)).map_err(|error| match error {
+    pub fn know_file(&mut self, bytes: Vec<u8>, name: &str) -> Thrown<JsValue> {
+        let known = self.of_file(bytes, Path::new(name)).map_err(|error| match error {
             Error::Mismatch(reason) => Error::Mismatch(format!("{name}: {reason}")),
             error => error,
         });
@@ -92,24 +98,69 @@ impl StereoPair {
         self.prior = Some(Arc::new(known.map_err(thrown)?));
         Ok(())
     }
+
+    /// The prior in a file.
+    fn of_file(&self, bytes: Vec<u8>, name: &Path) -> Result<Prior> {
+        let size = self.pair.size();
+        if ends_in(name, &["csv", "txt"]) {
+            let text = str::from_utf8(&bytes).map_err(|_| Error::Mismatch("it is not UTF-8 text".into()))?;
+            return Prior::points(size, PriorPoint::listed(text, None)?);
+        }
+        if ends_in(name, &["ply", "xyz"]) {
+            let rig = self.cameras("points of the scene")?;
+            let points = read_cloud::positions_in_memory(name, bytes)?;
+            return rig.prior(size, points, PriorKind::Points.usual_sigma());
+        }
+        let is_depth = name.to_string_lossy().to_lowercase().contains("depth");
+        let map = if is_depth { self.depths(&bytes, name)? } else { disparities(size, &bytes, name)? };
+        let kind = PriorKind::of_map(&map);
+        Prior::resized(kind, &map, size, kind.usual_sigma())
+    }
+
+    /// The cameras, which a file that holds `what` needs.
+    fn cameras(&self, what: &str) -> Result<&Rig> {
+        let needed = || Error::Mismatch(format!("it holds {what}: give it with a calibration of the pair"));
+        self.rig.as_ref().ok_or_else(needed)
+    }
+
+    /// A map of depths as disparities of the view, of the size of the map.
+    fn depths(&self, bytes: &[u8], name: &Path) -> Result<Plane<f32>> {
+        let rig = self.cameras("depths")?;
+        let reason = "it holds depths in millimetres or metres: add a line `unit=` with mm, cm or m, that of the baseline, to the calibration";
+        let needed = || Error::Mismatch(reason.into());
+        let baseline = rig.unit().millimetres().ok_or_else(needed)?;
+        let reader = Reader::default();
+        let (map, [whole, other]) = (reader.scaled_disparity_in_memory(name, bytes, 1.0), MILLIMETRES);
+        let (map, unit) = match map {
+            Err(Error::Read { cause: ReadError::NeedlessScale, .. }) => {
+                (reader.disparity_in_memory(name, bytes)?, other)
+            }
+            map => (map?, whole),
+        };
+        let scale = unit / baseline;
+        Ok(map.map(|&depth| {
+            let depth = f64::from(depth);
+            let known = depth > 0.0 && depth.is_finite();
+            if known { rig.disparity(depth * scale) as f32 } else { f32::INFINITY }
+        }))
+    }
 }
 
-/// The prior in a file, of a view of (width, height) pixels.
-fn of_file(size: (usize, usize), bytes: &[u8], name: &Path) -> Result<Prior> {
-    let extension = name.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    if ["csv", "txt"].iter().any(|list| extension.eq_ignore_ascii_case(list)) {
-        let text = str::from_utf8(bytes).map_err(|_| Error::Mismatch("it is not UTF-8 text".into()))?;
-        return Prior::points(size, PriorPoint::listed(text, None)?);
-    }
+/// A map of disparities in pixels of a view of this size, of its own size.
+fn disparities((width, _): (usize, usize), bytes: &[u8], name: &Path) -> Result<Plane<f32>> {
     let map = Reader::default().disparity_in_memory(name, bytes)?;
-    let ((w, h), (width, height)) = (map.size(), size);
-    if map.size() != size {
-        let reason =
-            format!("it has {w} x {h} pixels and the left view {width} x {height}: give a map of that size");
-        return Err(Error::Mismatch(reason));
-    }
-    let kind = PriorKind::of_map(&map);
-    Prior::map(kind, &map, kind.usual_sigma())
+    let own = map.size().0;
+    let stretch = if own == width { 1.0 } else { width as f32 / own as f32 };
+    Ok(map.map(|d| d * stretch))
+}
+
+/// The millimetres in a unit of depths that are whole numbers, and of others.
+const MILLIMETRES: [f64; 2] = [1.0, 1000.0];
+
+/// Whether a name ends in one of these, whatever their case.
+fn ends_in(name: &Path, ends: &[&str]) -> bool {
+    let extension = name.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    ends.iter().any(|end| extension.eq_ignore_ascii_case(end))
 }
 
 fn named(kind: PriorKind) -> &'static str {

@@ -69,9 +69,26 @@ impl Known {
         let cameras = Cameras::of(&calibration)?;
         let mut rectified = Rectified::new(&by, pair, By::Calibration)?;
         rectified.pair.doffs = calibration.doffs;
+        rectified.pair.rig = Some(cameras.rig.in_original_frame(&by.rotations()[0]));
         rectified.notes = named(&self.names, by.doubts());
         rectified.notes.insert(0, format!("rectified by {}", self.names));
         Ok(Rectified { cameras: Some(cameras), ..rectified })
+    }
+}
+
+#[wasm_bindgen]
+impl StereoPair {
+    /// Takes the cameras of a calibration of images that are rectified already, unless it is of images of another size.
+    ///
+    /// # Errors
+    /// Where it lacks a value.
+    #[wasm_bindgen(js_name = "takenBy")]
+    pub fn taken_by(&mut self, known: &OfRectified) -> Thrown<()> {
+        let (width, height) = self.pair.size();
+        let is_other = |own: Option<u32>, size: usize| own.is_some_and(|own| own as usize != size);
+        let other = is_other(known.width(), width) || is_other(known.height(), height);
+        self.rig = if other { None } else { known.cameras()?.map(|cameras| cameras.rig) };
+        Ok(())
     }
 }
 

@@ -15,8 +15,10 @@ mod sign;
 pub(crate) use cameras::{CameraArgs, CameraNeed, above_zero};
 pub(crate) use execution::{ExecutionArgs, ThreadArgs};
 pub(crate) use method::MethodArgs;
+#[cfg(feature = "live")]
+pub(crate) use prior::POSE;
 pub(crate) use prior::{
-    CloudPoints, PRIOR_TOPIC, PriorArgs, PriorFile, PriorNames, PriorTopicArgs, PriorView,
+    CloudPoints, PRIOR_TOPIC, PriorArgs, PriorFile, PriorNames, PriorTopicArgs, PriorView, Way,
 };
 pub use prior::{Kind as PriorKind, LengthUnit};
 pub(crate) use reading::{ReadingArgs, disparity, scale};

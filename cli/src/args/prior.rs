@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use clap::ValueEnum;
 use mrfgs::calibration::cameras::Pose;
-use mrfgs::calibration::pose;
+use mrfgs::calibration::{pose, trajectory};
 use mrfgs::depth::Rig;
 use mrfgs::error::ReadError;
 use mrfgs::image::read::Reader;
-use mrfgs::image::{Plane, read_cloud};
+use mrfgs::image::read_cloud;
 use mrfgs::low_level::text;
 use mrfgs::prior::{PriorKind, PriorPoint};
 use mrfgs::{Error, Prior};
@@ -127,7 +127,9 @@ pub(crate) struct PriorView {
 pub(crate) const PRIOR_TOPIC: &str = "--prior-topic";
 /// The flags of a prior, for messages.
 const FLAGS: PriorNames =
-    PriorNames { file: "--prior", kind: "--prior-kind", unit: "--prior-unit", pose: "--prior-pose" };
+    PriorNames { file: "--prior", kind: "--prior-kind", unit: "--prior-unit", pose: POSE };
+/// The flag of a pose.
+pub(crate) const POSE: &str = "--prior-pose";
 
 impl PriorArgs {
     /// The file, if there is one.
@@ -153,13 +155,39 @@ impl PriorArgs {
 
     /// Reads the prior for a view.
     pub(crate) fn read(&self, view: PriorView) -> Result<Option<Arc<Prior>>> {
-        self.file().map(|path| self.read_file(path, view)).transpose()
+        self.check_sigma()?;
+        self.file().map(|path| self.at(path).read(view)).transpose()
     }
 
-    /// Reads a file as the flags say, whatever file they name.
-    pub(crate) fn read_file(&self, path: &Path, view: PriorView) -> Result<Arc<Prior>> {
+    /// Reads a file as the flags say, whatever file they name, with the pose that was read already.
+    pub(crate) fn read_posed(&self, path: &Path, pose: Option<Pose>, view: PriorView) -> Result<Arc<Prior>> {
         self.check_sigma()?;
-        self.at(path).read(view)
+        PriorFile { placed: pose, ..self.at(path) }.read(view)
+    }
+
+    /// Reads the pose of a point cloud, if there is one.
+    pub(crate) fn pose(&self) -> Result<Option<Pose>> {
+        Ok(self.prior_pose.as_deref().map(pose::read).transpose()?)
+    }
+
+    /// How the cameras have moved at each frame but the first, and the file that says so, if there is one.
+    pub(crate) fn way(&self, view: PriorView) -> Result<Option<Way>> {
+        let Some(file) = &self.prior_pose else { return Ok(None) };
+        let needed = || Failure::usage(POSE, "moves the last frame, which needs a calibration; add one");
+        let rig = view.rig.ok_or_else(needed)?;
+        let scale = self.prior_unit.map_or(1.0, |unit| unit.scale(&rig));
+        let motions = trajectory::motions(&trajectory::read(file)?).into_iter();
+        let motions = motions.map(|Pose { rotation, translation }| {
+            let translation = translation.map(|v| v * scale);
+            Pose { rotation, translation }
+        });
+        Ok(Some(Way { file: file.clone(), rig, motions: motions.collect() }))
+    }
+
+    /// Why the cameras are needed to move the last frame, if they are.
+    pub(crate) fn need_of_way(&self) -> Option<CameraNeed> {
+        let with_unit = self.prior_unit.is_some();
+        self.prior_pose.as_ref().map(|_| CameraNeed { flag: POSE.into(), unit: with_unit })
     }
 
     fn check_sigma(&self) -> Result<()> {
@@ -176,7 +204,7 @@ impl PriorArgs {
                       or add it to --baseline";
         let needed = || Failure::usage(PRIOR_TOPIC, reason);
         let rig = view.rig.filter(|rig| rig.unit().millimetres().is_some()).ok_or_else(needed)?;
-        let pose = self.prior_pose.as_deref().map(pose::read).transpose()?;
+        let pose = self.pose()?;
         let unit = self.prior_unit.unwrap_or(LengthUnit::M);
         let sigma = self.prior_sigma.unwrap_or(PriorKind::Points.usual_sigma());
         Ok(CloudPoints { size: view.size, rig, pose, scale: unit.scale(&rig), sigma })
@@ -184,8 +212,17 @@ impl PriorArgs {
 
     fn at<'a>(&'a self, path: &'a Path) -> PriorFile<'a> {
         let &Self { prior_sigma: sigma, prior_kind: kind, prior_unit: unit, .. } = self;
-        PriorFile { path, sigma, kind, unit, pose: self.prior_pose.as_deref(), names: FLAGS }
+        PriorFile { path, sigma, kind, unit, pose: self.prior_pose.as_deref(), placed: None, names: FLAGS }
     }
+}
+
+/// The way of moving cameras.
+pub(crate) struct Way {
+    pub(crate) file: PathBuf,
+    /// The cameras, with points in the frame of the left camera that took the image.
+    pub(crate) rig: Rig,
+    /// What takes points of each frame into the next, in the unit of the baseline.
+    pub(crate) motions: Vec<Pose>,
 }
 
 /// How points of the scene become the prior of a view.
@@ -228,6 +265,8 @@ pub(crate) struct PriorFile<'a> {
     pub(crate) unit: Option<LengthUnit>,
     /// The pose of a point cloud.
     pub(crate) pose: Option<&'a Path>,
+    /// What the file of the pose says, if it was read already.
+    pub(crate) placed: Option<Pose>,
     pub(crate) names: PriorNames,
 }
 
@@ -293,7 +332,10 @@ impl PriorFile<'_> {
 
     /// The points of a cloud that the left view sees.
     fn cloud(&self, view: PriorView, rig: &Rig) -> Result<Prior> {
-        let pose = self.pose.map(pose::read).transpose()?;
+        let pose = match self.placed {
+            Some(pose) => Some(pose),
+            None => self.pose.map(pose::read).transpose()?,
+        };
         let (scale, sigma) = (self.scale(rig), self.sigma_of(PriorKind::Points));
         let points = CloudPoints { size: view.size, rig: *rig, pose, scale, sigma };
         points.prior(read_cloud::positions(self.path)?).map_err(|e| self.of_library(e))
@@ -325,20 +367,9 @@ impl PriorFile<'_> {
         });
         let kind = self.kind().unwrap_or_else(|| PriorKind::of_map(&map));
         let sigma = self.sigma_of(kind);
-        let prior = if map.size() == view.size {
-            Prior::map(kind, &map, sigma)
-        } else {
-            let ((w, h), (width, height)) = (map.size(), view.size);
-            // Of the same shape, within a pixel of the smaller one.
-            if (w * height).abs_diff(h * width) > width.max(height) {
-                let reason = format!(
-                    " has {w} x {h} pixels, LEFT {width} x {height}; give a map of LEFT, or of the same shape in another size"
-                );
-                return Err(self.refused(reason));
-            }
-            let stretch = if self.unit.is_some() { 1.0 } else { width as f32 / w as f32 };
-            resized(kind, &map.map(|d| d * stretch), view.size, sigma)
-        };
+        let (own, (width, _)) = (map.size().0, view.size);
+        let stretch = if self.unit.is_some() || own == width { 1.0 } else { width as f32 / own as f32 };
+        let prior = Prior::resized(kind, &map.map(|d| d * stretch), view.size, sigma);
         prior.map_err(|e| self.of_library(e))
     }
 
@@ -350,24 +381,6 @@ impl PriorFile<'_> {
             points.map(|point| PriorPoint { disparity: self.disparity(point.disparity, view), ..point });
         Prior::points(view.size, points).map_err(|e| self.of_library(e))
     }
-}
-
-/// A map of another size as a prior of a view. The value of a pixel counts in all of its area, or of points in the middle of it.
-fn resized(kind: PriorKind, map: &Plane<f32>, size: (usize, usize), sigma: f64) -> mrfgs::Result<Prior> {
-    let ((w, h), (width, height)) = (map.size(), size);
-    if kind == PriorKind::Surface {
-        let of = |x: usize, y: usize| map[((2 * x + 1) * w / (2 * width), (2 * y + 1) * h / (2 * height))];
-        return Prior::map(kind, &Plane::from_fn(width, height, of), sigma);
-    }
-    let middle = |i: usize, own: usize, count: usize| (i as f64 + 0.5) * own as f64 / count as f64 - 0.5;
-    let all = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).filter(|at| map[*at].is_finite());
-    let point = |(x, y): (usize, usize)| PriorPoint {
-        x: middle(x, width, w),
-        y: middle(y, height, h),
-        disparity: map[(x, y)].into(),
-        sigma,
-    };
-    Prior::points(size, all.map(point))
 }
 
 /// Whether a file holds a list of points in the left view.

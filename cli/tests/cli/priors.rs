@@ -201,3 +201,125 @@ fn frames_of_a_sequence_have_priors() {
     run(&folder, "sequence left right out --prior none --max-disparity 31")
         .failed(1, "none & holds no files");
 }
+
+/// Frames of the rendered sequence of a moving rig in `left`, `right` and `truth`, dark and with noise, so that one frame alone tells
+/// little; `calib.txt`; and the poses of the left camera in both forms.
+fn moving(folder: &Folder, frames: u32) {
+    const SIZE: (usize, usize) = (160, 120);
+    // Frames of the film in a step: the views move by up to 10 pixels.
+    const STRIDE: u32 = 15;
+    for camera in ["left", "right", "truth"] {
+        fs::create_dir(folder.join(camera)).unwrap();
+    }
+    let (mut kitti, mut tum) = (Vec::new(), vec!["# time tx ty tz qx qy qz qw\n".to_owned()]);
+    let mut state = 1_u32;
+    for step in 0..frames {
+        let scene = scenes::moving(STRIDE * step, SIZE.0, SIZE.1, 24);
+        let mut noisy = |level: u8| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            level / 4 + (state >> 24) as u8 / 12
+        };
+        for (camera, view) in [("left", &scene.left), ("right", &scene.right)] {
+            let levels = view.data().as_flattened().iter().map(|level| noisy(*level)).collect();
+            let picture = image::RgbImage::from_raw(SIZE.0 as u32, SIZE.1 as u32, levels).unwrap();
+            picture.save(folder.join(format!("{camera}/{step}.png"))).unwrap();
+        }
+        fs::write(folder.join(format!("truth/{step}.pfm")), pfm::encode(&scene.truth)).unwrap();
+        fs::write(folder.join("calib.txt"), scene.calibration()).unwrap();
+        let [x, z] = [0.01, 0.004].map(|by| by * f64::from(STRIDE * step));
+        kitti.push(format!("1 0 0 {x} 0 1 0 0 0 0 1 {z}\n"));
+        tum.push(format!("{step} {x} 0 {z} 0 0 0 1\n"));
+    }
+    fs::write(folder.join("kitti.txt"), kitti.concat()).unwrap();
+    fs::write(folder.join("tum.txt"), tum.concat()).unwrap();
+}
+
+#[test]
+fn the_last_frame_is_moved_by_known_poses() {
+    const FRAMES: u32 = 6;
+    let folder = Folder::new();
+    moving(&folder, FRAMES);
+    // The maps but the first, the percentage of their pixels that are wrong by more than 2 px, and how much errors change from frame to
+    // frame, in px.
+    let matched = |flags: &str| {
+        let line = "sequence left right out --calib calib.txt --device cpu";
+        let said = run(&folder, &format!("{line} {flags}")).succeeded().stderr;
+        let maps: Vec<_> = (0..FRAMES).map(|i| read_pfm(folder.join(format!("out/{i}.pfm")))).collect();
+        fs::remove_dir_all(folder.join("out")).unwrap();
+        let errors: Vec<Vec<f32>> = (0..FRAMES as usize)
+            .map(|i| {
+                let truth = read_pfm(folder.join(format!("truth/{i}.pfm")));
+                maps[i].data().iter().zip(truth.data()).map(|(d, t)| (d - t).clamp(-8.0, 8.0)).collect()
+            })
+            .collect();
+        let mean = |values: &[f32]| f64::from(values.iter().sum::<f32>()) / values.len() as f64;
+        let wrong: Vec<f32> =
+            errors[1..].concat().iter().map(|e| if e.abs() <= 2.0 { 0.0 } else { 100.0 }).collect();
+        let changes: Vec<f32> = errors
+            .windows(2)
+            .flat_map(|two| two[0].iter().zip(&two[1]).map(|(a, b)| (a - b).abs()))
+            .collect();
+        let (wrong, change) = (mean(&wrong), mean(&changes));
+        println!("{flags:>40}: {wrong:.2} % wrong, changes of {change:.3} px");
+        (maps, wrong, change, said)
+    };
+    let (_, plain, flicker, _) = matched("");
+    let (_, still, jumps, _) = matched("--prior last");
+    let (maps, wrong, change, said) = matched("--prior last --prior-pose kitti.txt");
+    assert!(!said.contains("warning"), "{said}");
+    assert!(
+        wrong < 0.9 * plain && wrong < 0.8 * still,
+        "{plain} %, with the last {still} %, moved {wrong} %"
+    );
+    assert!(change < 0.95 * flicker && change < 0.95 * jumps, "{flicker} px, {jumps} px, then {change} px");
+    assert!(matched("--prior last --prior-pose tum.txt --threads 1").0 == maps);
+    // In another unit.
+    let millimetres = |line: &str| {
+        let words = line.split(' ').enumerate();
+        let scaled =
+            words.map(
+                |(i, v)| if i % 4 == 3 { (1000.0 * v.parse::<f64>().unwrap()).to_string() } else { v.into() },
+            );
+        scaled.collect::<Vec<_>>().join(" ") + "\n"
+    };
+    let kitti = fs::read_to_string(folder.join("kitti.txt")).unwrap();
+    fs::write(folder.join("mm.txt"), kitti.lines().map(millimetres).collect::<String>()).unwrap();
+    let (_, in_unit, _, _) = matched("--prior last --prior-pose mm.txt --prior-unit mm");
+    assert!((in_unit - wrong).abs() < 0.1, "{in_unit} %");
+    // Controls: a way to the other side makes it worse, and one far ahead is noticed.
+    let control = |x: f64, z: f64| {
+        let line =
+            |step: u32| format!("1 0 0 {} 0 1 0 0 0 0 1 {}\n", x * f64::from(step), z * f64::from(step));
+        fs::write(folder.join("other.txt"), (0..FRAMES).map(line).collect::<String>()).unwrap();
+        matched("--prior last --prior-pose other.txt")
+    };
+    let (_, misled, _, _) = control(-0.5, 0.0);
+    assert!(misled > 1.3 * wrong, "{misled} %");
+    let (_, _, _, said) = control(0.0, 0.9);
+    assert!(said.contains("contradict"), "{said}");
+    // A way that ends early, and what else does not fit.
+    fs::write(folder.join("short.txt"), kitti.lines().take(2).collect::<Vec<_>>().join("\n")).unwrap();
+    let (_, _, _, said) = matched("--prior last --prior-pose short.txt");
+    assert!(
+        said.contains("warning: short.txt has poses of 2 frames; later ones are matched without the last"),
+        "{said}"
+    );
+    let line = "sequence left right out --max-disparity 23 --prior last --prior-pose";
+    run(&folder, &format!("{line} calib.txt --calib calib.txt")).failed(1, "calib.txt: line 1 & no pose");
+    fs::remove_file(folder.join("calib.txt")).unwrap();
+    run(&folder, &format!("{line} kitti.txt")).failed(2, "--prior-pose & camera values");
+}
+
+#[test]
+fn flags_of_sequences_stand_under_their_headings() {
+    let help = run(&Folder::new(), "sequence --help").succeeded().stdout;
+    let (before, known) = help.split_once("What is known of the scene:").unwrap();
+    let (known, after) = known.split_once("Method:").unwrap();
+    for (flag, there) in
+        [("--steady", before), ("--recalibrate", before), ("--prior-topic", known), ("--device", after)]
+    {
+        let line = format!("\n      {flag}");
+        assert_eq!(help.matches(&line).count(), 1, "{flag}");
+        assert!(there.contains(&line), "{flag}");
+    }
+}

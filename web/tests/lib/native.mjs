@@ -6,7 +6,7 @@ import { join } from 'node:path';
 import { ROOT } from './paths.mjs';
 
 /** The program; the variable MRFGS names another build. */
-const PROGRAM = process.env.MRFGS ?? join(ROOT, 'target/release/mrfgs');
+export const PROGRAM = process.env.MRFGS ?? join(ROOT, 'target/release/mrfgs');
 
 /** Runs `mrfgs match` on the CPU, without `right` if the file `left` holds both views, and returns the bytes of the map and of the outputs in `also`. */
 export function native(left, right, flags = [], also = ['raw', 'confidence', 'validity']) {

@@ -234,7 +234,7 @@ impl Listed {
 /// The prior of a row, whose files are at these paths.
 fn prior_file<'a>(row: &PriorRow, path: &'a Path, pose: Option<&'a Path>) -> PriorFile<'a> {
     let &PriorRow { sigma, kind, unit, .. } = row;
-    PriorFile { path, sigma, kind, unit, pose, names: PRIOR_COLUMNS }
+    PriorFile { path, sigma, kind, unit, pose, placed: None, names: PRIOR_COLUMNS }
 }
 
 pub(super) fn shown(path: &Path) -> String {

@@ -15,7 +15,7 @@ use mrfgs::threads;
 use mrfgs::{Conditioning, Matcher, Prior};
 use mrfgs_ros::messages::{CameraInfo, Encoding, Header};
 
-use crate::args::{PriorTopicArgs, PriorView, Sign};
+use crate::args::{POSE, PriorTopicArgs, PriorView, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::messages::{self, Messages, Sink};
 use crate::outputs::{Also, Cameras, Outcome};
@@ -77,6 +77,11 @@ impl<'a> Matching<'a> {
         if args.prior.file().is_some_and(Path::is_dir) {
             let reason = "is a folder, but live frames have no names; give a file for all frames, or a lidar's topic with --prior-topic";
             return Err(Failure::usage("--prior", reason));
+        }
+        if known::is_moved_last(&args.prior) {
+            let reason =
+                "with --prior last names the poses of all frames, which live ones do not have; remove it";
+            return Err(Failure::usage(POSE, reason));
         }
         let matcher = Matcher::builder().method(method).execution(execution).build()?;
         Ok(Self {
@@ -161,7 +166,7 @@ impl<'a> Matching<'a> {
             job = job.prior(prior);
         }
         let matched = job.run()?;
-        if known.priors.follow() {
+        if known.priors.follow().is_some() {
             known.last = Some(Arc::new(Prior::of_maps(&matched.maps)));
         } else if let Some(doubt) = known::contradicted(&matched) {
             doubts.push(doubt);

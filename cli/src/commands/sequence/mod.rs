@@ -53,6 +53,8 @@ Examples:
   mrfgs sequence left right maps --calib c --prior scans --prior-pose t.txt
   # Cameras that stand still:
   mrfgs sequence left.mp4 right.mp4 disparity.mp4 --prior last
+  # Cameras that move, with their poses:
+  mrfgs sequence left right maps --calib c --prior last --prior-pose poses.txt
   # Raw images and a calibration, with depth in millimetres:
   mrfgs sequence left right maps --rectify --calib c.yml --also depth-mm";
 
@@ -61,7 +63,18 @@ const PRIOR: &str = "Disparities that are known: a file for all frames, a folder
 const PRIORS: &str = "\
 A file of a folder belongs to the frame that has its name, up to the extension; frames without a file have no prior. Files are as for `mrfgs \
 match`. With `last`, the disparities measured in a frame are known in the next: for cameras that stand still, whose maps then flicker less. \
-Frames are then matched one after another.";
+Frames are then matched one after another. If the cameras move, --prior-pose gives their poses.";
+
+/// The flag `--prior-pose` of sequences.
+const PRIOR_POSE: &str = "Where point clouds come from: the rotation and translation that take their points into the frame of the left \
+camera. With --prior last, the way of the left camera";
+const PRIOR_POSES: &str = "\
+For clouds, a text with 12 or 16 numbers, the rows of [R T]; entries R and T in YAML, JSON or as in KITTI's `calib_velo_to_cam.txt`; KITTI's \
+`Tr_velo_to_cam` or Tr; or COLMAP's images.txt, whose first image is the left one.
+
+With `--prior last`, a line for each frame, in their order: the pose of the left camera in the world, as it took the image. Lines are those of \
+KITTI's `poses.txt` (12 numbers, the rows of [R T]) or of TUM's trajectories (`time tx ty tz qx qy qz qw`). T has the unit of the baseline, or \
+of --prior-unit.";
 
 /// Match the frames of a video
 ///
@@ -87,6 +100,7 @@ Frames are then matched one after another.";
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_missing_positional = true)]
 #[command(mut_arg("prior", |arg| arg.help(PRIOR).long_help(format!("{PRIOR}\n\n{PRIORS}"))))]
+#[command(mut_arg("prior_pose", |arg| arg.help(PRIOR_POSE).long_help(format!("{PRIOR_POSE}\n\n{PRIOR_POSES}"))))]
 #[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
 pub(crate) struct Args {
     /// Frames of the left camera, or frames with both views
@@ -128,10 +142,6 @@ pub(crate) struct Args {
     rectify: bool,
     #[command(flatten)]
     rectification: RectificationArgs,
-    #[command(flatten)]
-    prior: PriorArgs,
-    #[command(flatten)]
-    prior_topic: PriorTopicArgs,
     /// Steadies still surfaces: where the image does not change, disparities are averaged with earlier frames, weighted by confidence.
     /// Confidence, validity, raw and the right view's map are not averaged
     #[arg(long)]
@@ -139,13 +149,6 @@ pub(crate) struct Args {
     /// Corrects the frames if their matches show that the right camera has turned since the calibration. Without it, you are only told
     #[arg(long)]
     recalibrate: bool,
-    #[command(flatten)]
-    maps: MapArgs,
-    /// Writes a line of JSON per frame: `frame` (its name), the fields of `match --json` with `seconds` since the first frame, and with
-    /// known cameras `turned`, how far the right camera has turned up, right and clockwise since the calibration, in degrees. `-` prints
-    /// them
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
     /// Checks everything up to the first frame and prints its plan (levels, schedule, memory), but matches and writes nothing
     #[arg(long)]
     dry_run: bool,
@@ -155,6 +158,18 @@ pub(crate) struct Args {
     #[arg(long)]
     quiet: bool,
 
+    // Each of these has a heading in the help, under which all that follows would stand.
+    #[command(flatten)]
+    maps: MapArgs,
+    /// Writes a line of JSON per frame: `frame` (its name), the fields of `match --json` with `seconds` since the first frame, and with
+    /// known cameras `turned`, how far the right camera has turned up, right and clockwise since the calibration, in degrees. `-` prints
+    /// them
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    #[command(flatten)]
+    prior: PriorArgs,
+    #[command(flatten)]
+    prior_topic: PriorTopicArgs,
     #[command(flatten)]
     method: MethodArgs,
     #[command(flatten)]

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use mrfgs::check::Warning;
 use mrfgs::drift::Turn;
 use mrfgs::image::Pair;
+use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
 use mrfgs::region::Region;
 use mrfgs::{Frame, Matched, Matcher, Prior};
@@ -20,7 +21,7 @@ use crate::failure::{Failure, Result};
 use crate::outputs::{Files, MatchRecord};
 use crate::pairs::input;
 use crate::progress::Counter;
-use crate::sequences::known::{self, CloudDoubt, FramePriors};
+use crate::sequences::known::{self, CloudDoubt, Follow, FramePriors};
 use crate::sequences::{FramePair, Frames, Rectifier, turned};
 use crate::text::plural;
 use crate::{console, remedy, stop};
@@ -95,7 +96,7 @@ impl Pipeline {
         let (matched, written) = thread::scope(|scope| {
             let writing = scope.spawn(|| write(to_write, sink, &mut bar));
             let first = ReadyFrame { frame: first, turn, prior };
-            let matched = self.matched(first, follow, &receiver, takes, start, found);
+            let matched = self.matched(first, follow.as_ref(), &receiver, takes, start, found);
             (matched, writing.join())
         });
         drop(bar);
@@ -131,7 +132,7 @@ impl Pipeline {
     fn matched(
         &mut self,
         first: ReadyFrame,
-        follow: bool,
+        follow: Option<&Follow>,
         frames: &Receiver<NextFrame>,
         takes: WriterNeeds,
         start: Instant,
@@ -149,6 +150,7 @@ impl Pipeline {
         let (started, under_way) = channel();
         let mut failure = None;
         let mut next = Some(Ok(first));
+        let (mut count, quiet) = (0, self.quiet);
         let pairs = std::iter::from_fn(|| {
             let ReadyFrame { frame, turn, prior } =
                 match next.take().map_or_else(|| received(frames).map(Result::flatten), Some)? {
@@ -158,6 +160,10 @@ impl Pipeline {
                         return None;
                     }
                 };
+            if let Some(doubt) = follow.and_then(|follow| follow.ended(count)).filter(|_| !quiet) {
+                console::say(&format!("warning: {doubt}"));
+            }
+            count += 1;
             // The receiver outlives this send, so it cannot fail.
             let (part, window) = narrowed(frame.pair);
             let about = (frame.name, frame.header, turn);
@@ -176,7 +182,7 @@ impl Pipeline {
             told.turn = turn.or(told.turn);
             // Once, as it may hold for all frames.
             if !doubted
-                && !follow
+                && follow.is_none_or(Follow::moves)
                 && let Some(doubt) = known::contradicted(&matched)
             {
                 doubted = true;
@@ -198,10 +204,16 @@ impl Pipeline {
                 Err(_) => ControlFlow::Break(()),
             }
         };
-        let ended = if follow {
-            matcher.run_following(pairs, stop::flag(), take)
-        } else {
-            matcher.run_all_until(pairs, stop::flag(), take)
+        let ended = match follow {
+            Some(follow) => {
+                let mut done = 0;
+                let known = |maps: &Maps| {
+                    done += 1;
+                    follow.next(done - 1, maps)
+                };
+                matcher.run_knowing(pairs, stop::flag(), known, take)
+            }
+            None => matcher.run_all_until(pairs, stop::flag(), take),
         };
         ran.ended = match (ended, failure) {
             (Err(error), _) => Err(error.into()),
