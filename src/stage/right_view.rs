@@ -20,6 +20,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| [volumes(&[Volume::Belief(0)]), vec![Data::LEFT]].concat(),
     writes: |_| maps(&[Map::RightLabel, Map::RightBest]),
     reach: Some(0),
-    cell: 0.3,
+    cell: 0.1,
     ..Descriptor::NONE
 };

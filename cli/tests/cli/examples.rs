@@ -34,6 +34,11 @@ const NOT_RUN: &[(&str, &str)] = &[
         "for (left, right), found in zip(pairs, mrfgs.match_many(pairs, 63, matcher=matcher)):           # pairs of paths or arrays",
         "Python; its tests and scripts/engines try it",
     ),
+    (
+        "python python/examples/satellite.py left.tif right.tif surface.tif --folder job --resolution 0.5 --workers 4",
+        "Python with rasterio; scripts/geo tries it",
+    ),
+    ("apiVersion: batch/v1", "Kubernetes; scripts/geo checks it"),
     // These need other programs.
     (
         "ffmpeg -i stereo.mkv -pix_fmt yuv444p -f yuv4mpegpipe - | mrfgs sequence - - --method fast --max-disparity 63 | ffplay -",
@@ -56,10 +61,6 @@ const NOT_RUN: &[(&str, &str)] = &[
     (
         "sbatch --array=1-8 --wrap 'mrfgs match left.tif right.tif map.tif --max-disparity 75 --blocks job'",
         "needs Slurm; scripts/slurm tries it",
-    ),
-    (
-        "mrfgs batch pairs.csv maps --shard $((JOB_COMPLETION_INDEX + 1))/8",
-        "a Kubernetes job; the chapter on many pairs runs batch",
     ),
     ("parallel mrfgs batch pairs.csv maps --threads 2 --shard {}/8 ::: $(seq 8)", "needs GNU parallel"),
     (
@@ -89,6 +90,10 @@ const NOT_RUN: &[(&str, &str)] = &[
     (
         "mrfgs sequence left right maps --rectify --calib stereo.yml --prior scans --prior-pose lidar.txt",
         "takes a lidar; tests of priors have the same flags",
+    ),
+    (
+        "mrfgs sequence left right maps --calib calib.txt --prior last --prior-pose poses.txt",
+        "takes frames of a moving rig; tests of priors have the same flags",
     ),
     (
         "mrfgs match left.png right.png map.pfm --rectify --calib cameras.txt --calib images.txt --prior points3D.txt --prior-pose images.txt",

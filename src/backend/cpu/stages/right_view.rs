@@ -20,12 +20,20 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
         || vec![u32::MAX; width],
         |found, ((right, best), y)| {
             found.fill(u32::MAX);
-            right_row(plan, windows, y, &names, windows.row_of(belief, y), masked.row(y), found);
+            let left = LeftRow { y, belief: windows.row_of(belief, y), masked: masked.row(y) };
+            right_row(plan, windows, &names, left, found);
             for ((right, best), &found) in right.iter_mut().zip(best).zip(found.iter().rev()) {
                 (*right, *best) = (found as u16, (found >> 16) as u16);
             }
         },
     );
+}
+
+/// A row of the left view.
+struct LeftRow<'a, U> {
+    y: usize,
+    belief: &'a [U],
+    masked: &'a [bool],
 }
 
 #[pulp::with_simd(right_row = crate::vectors::widest())]
@@ -34,13 +42,11 @@ fn right_row_on<'a, S: pulp::Simd, U: Units>(
     _: S,
     plan: &'a Plan,
     windows: &'a Windows,
-    y: usize,
     names: &'a [u32],
-    row: &'a [U],
-    masked: &'a [bool],
+    left: LeftRow<'a, U>,
     found: &'a mut [u32],
 ) {
-    let level = &plan.levels[0];
+    let (level, LeftRow { y, belief: row, masked }) = (&plan.levels[0], left);
     let width = level.width;
     for x in plan.core.clone().filter(|&x| !masked[x]) {
         let window = windows.row(y)[x];
