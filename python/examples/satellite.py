@@ -194,10 +194,9 @@ def look(scene, matcher, heights):
         window = 0, 0, *image.shape[::-1]
     scale = min(0.25, 1000 / max(window))
     views = Views(scene, window, heights, scale)
-    found = match(views, matcher)
-    if found is None:
-        raise SystemExit("satellite: the images show no common ground at these heights")
-    left, right, found = found
+    left, right, found = match(views, matcher) or (None, None, None)
+    if found is None or not (found.validity == 0).any():
+        raise SystemExit("satellite: the images show no common ground at these heights; give others with --heights")
     y, x = np.nonzero(found.validity == 0)
     disparity = found.disparity[y, x]
     low, high = np.percentile(views.ground(x + 0.5, y + 0.5, disparity)[2], (0.5, 99.5))
@@ -293,6 +292,13 @@ def write(paths, output, resolution, crs):
     return shape, len(cell)
 
 
+def interval(text):
+    low, high = (float(word) for word in text.split(","))
+    if not low < high:
+        raise ValueError(text)
+    return low, high
+
+
 def utm(longitude, latitude):
     return f"EPSG:{32600 + 100 * (latitude < 0) + int((longitude + 180) // 6) + 1}"
 
@@ -302,7 +308,7 @@ def main():
     for name in ("left", "right", "output"):
         parser.add_argument(name)
     parser.add_argument("--folder", type=Path, required=True, help="the points of the tiles")
-    parser.add_argument("--heights", help="lowest,highest in metres; found in a small copy of the pair if not given")
+    parser.add_argument("--heights", type=interval, metavar="LOW,HIGH", help="in metres; found in a small copy of the pair if not given")
     parser.add_argument("--terrain", help="a coarse model of the ground, above the ellipsoid")
     parser.add_argument("--terrain-sigma", type=float, default=10, help="its expected error in metres")
     parser.add_argument("--resolution", type=float, default=0.5, help="of the model, in metres")
@@ -322,12 +328,8 @@ def main():
         rpcs = left.rpcs
     scene = Scene(args.left, args.right, utm(rpcs.long_off, rpcs.lat_off))
     matcher = mrfgs.Matcher(device=args.device, threads=args.threads)
-    if args.heights:
-        possible = tuple(float(height) for height in args.heights.split(","))
-    else:
-        possible = rpcs.height_off - rpcs.height_scale, rpcs.height_off + rpcs.height_scale
-    found, lower = look(scene, matcher, possible)
-    heights = possible if args.heights else found
+    found, lower = look(scene, matcher, args.heights or (rpcs.height_off - rpcs.height_scale, rpcs.height_off + rpcs.height_scale))
+    heights = args.heights or found
     print(f"heights from {heights[0]:.0f} to {heights[1]:.0f} m; the rectified views are {abs(lower):.1f} rows apart", flush=True)
 
     terrain = Terrain(args.terrain, args.terrain_sigma) if args.terrain else None
