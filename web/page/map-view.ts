@@ -244,6 +244,7 @@ export class MapView {
                 wipe((100 * (event.clientX - x)) / width);
             }
         });
-        wipe(0);
+        // Both are seen at once, and that there is something to move.
+        wipe(50);
     }
 }

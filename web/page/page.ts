@@ -8,6 +8,7 @@ import { type Pixel, MapView } from './map-view';
 import { tooLarge } from './memory';
 import { keepOffline } from './offline';
 import { painted } from './paint';
+import { sharePicture } from './picture';
 import { PointsTab } from './points';
 import { told } from './readout';
 import { lit } from './relief';
@@ -151,9 +152,7 @@ async function start(): Promise<void> {
         return;
     }
     // The first view is a result, unless the user was faster.
-    const linked = new URLSearchParams(location.hash.slice(1));
-    const first = SCENES.find(({ name }) => name === linked.get('scene')) ?? SCENES[0];
-    settings.take(linked);
+    const first = linked() ?? SCENES[0];
     if (first && slots.untouched) {
         await slots.open(first.name);
         await busy;
@@ -171,6 +170,13 @@ async function start(): Promise<void> {
         be(idle());
     }
     await showDepth();
+}
+
+/** Takes the settings of the address, and returns its scene. */
+function linked(): Scene | undefined {
+    const link = new URLSearchParams(location.hash.slice(1));
+    settings.take(link);
+    return SCENES.find(({ name }) => name === link.get('scene'));
 }
 
 /** The name of the GPU; undefined if there is none. Retries if the worker was replaced in the meantime. */
@@ -712,10 +718,14 @@ async function compare(): Promise<void> {
     });
 }
 
-async function download(file: File): Promise<void> {
+async function download(file: File | 'picture'): Promise<void> {
     const [mine, of] = [result, pair];
     say('save-problem', undefined);
     try {
+        if (file === 'picture') {
+            await sharePicture(stem(of?.name ?? ''));
+            return;
+        }
         if (!held() || !mine || !of) {
             throw new Error('The engine was started again since this match. Match once more to save.');
         }
@@ -740,7 +750,7 @@ by('cancel').addEventListener('click', () => {
 by('rectify').addEventListener('click', () => rectifyBy('matches'));
 by('compare').addEventListener('click', () => void compare());
 by('downloads').addEventListener('click', ({ target }) => {
-    const file = (target as HTMLElement).dataset['output'] as File | undefined;
+    const file = (target as HTMLElement).dataset['output'] as File | 'picture' | undefined;
     if (file) {
         void download(file);
     }
@@ -756,6 +766,13 @@ for (const id of ['relief', 'stereo', 'behind']) {
 }
 offerCamera((views) => {
     void slots.take(views, { name: 'camera', wish: { match: true, rectify: 'matches' } });
+});
+// The user has edited the address, or followed a link to another scene.
+addEventListener('hashchange', () => {
+    const scene = linked();
+    if (scene) {
+        void slots.open(scene.name);
+    }
 });
 list.select(by('tab-disparity'));
 void start();

@@ -91,6 +91,8 @@ export class Settings {
         if (min !== undefined && max !== undefined && Number.isInteger(min) && Number.isInteger(max) && min <= max) {
             this.give({ min, max });
             this.typed = true;
+            // The range is that of the pair of the link, whatever its size.
+            this.pixels = { width: 0, height: 0 };
         }
     }
 

@@ -145,6 +145,25 @@ describe('looks', () => {
         assert.deepEqual(await canvas('under'), left);
     });
 
+    it('saves the picture that is shown, with its scale', async () => {
+        await visit.tab.click('#tab-disparity');
+        await visit.tab.waitForSelector('#map[data-shown=disparity]');
+        const { name, bytes } = await visit.save('picture');
+        assert.equal(name, 'im0-picture.png');
+        const picture = PNG.sync.read(bytes);
+        assert.deepEqual([picture.width, picture.height], [WIDTH, HEIGHT + 16]);
+        const map = 4 * WIDTH * HEIGHT;
+        assert.equal(Buffer.compare(picture.data.subarray(0, map), await canvas('view')), 0);
+        // The scale has text and many colours.
+        const below = new Set(new Uint32Array(Uint8Array.from(picture.data.subarray(map)).buffer));
+        assert.ok(below.has(0xffffffff) && below.size > 100, `${below.size} colours`);
+        // Without a scale there is only the map.
+        await visit.tab.click('#tab-left');
+        await visit.tab.waitForSelector('#map[data-shown=left]');
+        assert.equal(PNG.sync.read((await visit.save('picture')).bytes).height, HEIGHT);
+        await visit.tab.click('#tab-disparity');
+    });
+
     it('saves a mesh that is open at edges, as glTF and PLY', async () => {
         const { name, bytes } = await visit.save('glb');
         assert.match(name, /\.glb$/);

@@ -36,6 +36,18 @@ describe('the first view', () => {
         await visit.tab.setViewport({ width: 1280, height: 800 });
     });
 
+    it('shows the map and the button in one screen', async () => {
+        for (const [width, height] of [[1440, 900], [768, 1024], [360, 740]]) {
+            await visit.tab.setViewport({ width, height });
+            const seen = await visit.tab.evaluate(() => ['match', 'stage-box'].map((id) => {
+                const { top, bottom } = document.getElementById(id).getBoundingClientRect();
+                return top >= 0 && bottom <= innerHeight;
+            }));
+            assert.deepEqual(seen, [true, true], `${width} x ${height}`);
+        }
+        await visit.tab.setViewport({ width: 1280, height: 800 });
+    });
+
     it('has links, and a version', async () => {
         assert.match(await visit.text('#version'), /^Version \d+\.\d+\.\d+$/);
         const licence = await visit.tab.evaluate(async () => (await fetch(document.querySelector('#about a').href)).text());

@@ -245,6 +245,9 @@ describe('views', () => {
         await other.waitForSelector('html[data-gpu]');
         const facts = await other.$eval('#facts', (facts) => facts.textContent);
         assert.match(facts, /^240 × 180 pixels · range 0 to 40 · default · .*CPU path/);
+        // Also when it is edited.
+        await other.evaluate(() => (location.hash = '#scene=mixed&preset=fast&range=0,40'));
+        await other.waitForFunction(() => /^320 × 240 pixels · range 0 to 40 · fast/.test(document.getElementById('facts').textContent));
         await other.close();
         await visit.tab.bringToFront();
     });
