@@ -104,8 +104,8 @@ fn of_sound_las(file: impl BufRead + Seek + Send + Sync + 'static) -> Found {
     }
 }
 
-/// Whether a LAS file is not packed, or says how: it has the fields of its points, and a table of at most as many chunks as the file has
-/// bytes, since the memory for the table is taken first. Leaves the file at its start.
+/// Whether a LAS file is not packed, or says how: its points consist of its fields, and it has a table of at most as many chunks as the
+/// file has bytes, since the memory for the table is taken first. Leaves the file at its start.
 #[cfg(feature = "clouds")]
 fn can_be_unpacked(file: &mut (impl Read + Seek)) -> std::io::Result<bool> {
     let mut word = [0; 8];
@@ -125,12 +125,17 @@ fn can_be_unpacked(file: &mut (impl Read + Seek)) -> std::io::Result<bool> {
         let has_chunks = !is_place(place) || at(place)? >> 32 <= length;
         // The records after the header, of which one lists the fields.
         let (mut record, count) = (at(94)? & 0xffff, at(100)? as u32);
-        let mut has_fields = true;
+        let mut has_fields = false;
         for _ in 0..count {
             let about = at(record + 14)?;
             let (kind, size) = (about >> 32 & 0xffff, about >> 48);
             if kind == LAZ_RECORD {
-                has_fields &= at(record + 54 + 32)? & 0xffff > 0;
+                let mut bytes = 0;
+                for field in 0..at(record + 54 + 32)? & 0xffff {
+                    bytes += at(record + 54 + 34 + 6 * field)? >> 16 & 0xffff;
+                }
+                // The fields of a point, which the decoder cuts its bytes into.
+                has_fields = bytes > 0 && bytes == at(105)? & 0xffff;
             }
             record += 54 + size;
         }
