@@ -126,8 +126,8 @@ impl Rig {
         from_original.map_or(point, |matrix| rotated(&transposed(&matrix), point))
     }
 
-    /// What the maps of a frame tell of the left view after the rig has moved: their measured disparities as a surface, drawn where the rig
-    /// sees it then. `motion` takes points from the frame of [`Rig::point`] before the motion into that after it, in the unit of the
+    /// The prior of the left view after the rig has moved, from the maps before: their measured disparities as a surface, drawn where the
+    /// rig sees it after the motion. `motion` takes points from the frame of [`Rig::point`] before the motion into that after it, in the unit of the
     /// baseline. Of several surfaces the nearest counts, and nothing is known of what the maps do not show.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use crate::text;
 
 /// Largest file, in bytes.
 const MOST_BYTES: u64 = 1 << 28;
-/// What a line may hold, for messages.
+/// The forms of a line, for error messages.
 const FORMS: &str =
     "give 12 numbers as in KITTI's poses.txt, or time tx ty tz qx qy qz qw as in TUM's trajectories";
 
@@ -56,7 +56,8 @@ pub fn of_text(name: &Path, text: &str) -> Result<Vec<Pose>> {
     Ok(poses)
 }
 
-/// What takes a point from the frame of the camera at one pose into that at the next, for each pose but the last.
+/// The motion from each pose to the next: it takes a point from the frame of the camera at one pose into that at the next. One fewer than
+/// the poses.
 #[must_use]
 pub fn motions(poses: &[Pose]) -> Vec<Pose> {
     poses.windows(2).map(|two| two[0].then(&two[1].inverse())).collect()
@@ -80,7 +81,7 @@ mod tests {
                 .unwrap();
         for poses in [kitti, tum] {
             let [motion] = motions(&poses)[..] else { panic!("two poses") };
-            // What stands at the origin of the second camera, and what is 1 to the right of it.
+            // A point in the centre of the second camera, and a point 1 to the right of it.
             for (point, expected) in [([1.0, 0.0, 0.0], [0.0; 3]), ([1.0, 0.0, -1.0], [1.0, 0.0, 0.0])] {
                 let moved = motion.moved(point);
                 assert!(moved.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{moved:?}");

@@ -244,7 +244,7 @@ export class MapView {
                 wipe((100 * (event.clientX - x)) / width);
             }
         });
-        // Both are seen at once, and that there is something to move.
+        // Shows the photo and the map at once, and that the divider moves.
         wipe(50);
     }
 }

@@ -229,7 +229,6 @@ async function read(matched: boolean): Promise<void> {
             pair = await take(signal, left, right);
             if (byHand()) {
                 rectify = 'matches';
-                found = undefined;
                 pair = await take(signal, left, right);
             }
             remarks.note(pair.notes, pair.by !== undefined);

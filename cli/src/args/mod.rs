@@ -18,7 +18,7 @@ pub(crate) use method::MethodArgs;
 #[cfg(feature = "live")]
 pub(crate) use prior::POSE;
 pub(crate) use prior::{
-    CloudPoints, PRIOR_TOPIC, PriorArgs, PriorFile, PriorNames, PriorTopicArgs, PriorView, Way,
+    CloudPoints, CloudPose, PRIOR_TOPIC, PriorArgs, PriorFile, PriorNames, PriorTopicArgs, PriorView, Way,
 };
 pub use prior::{Kind as PriorKind, LengthUnit};
 pub(crate) use reading::{ReadingArgs, disparity, scale};

@@ -159,10 +159,10 @@ impl PriorArgs {
         self.file().map(|path| self.at(path).read(view)).transpose()
     }
 
-    /// Reads a file as the flags say, whatever file they name, with the pose that was read already.
+    /// Reads `path` in place of the file of --prior, with `pose` in place of the file of --prior-pose.
     pub(crate) fn read_posed(&self, path: &Path, pose: Option<Pose>, view: PriorView) -> Result<Arc<Prior>> {
         self.check_sigma()?;
-        PriorFile { placed: pose, ..self.at(path) }.read(view)
+        PriorFile { pose: pose.map(CloudPose::Known), ..self.at(path) }.read(view)
     }
 
     /// Reads the pose of a point cloud, if there is one.
@@ -170,7 +170,7 @@ impl PriorArgs {
         Ok(self.prior_pose.as_deref().map(pose::read).transpose()?)
     }
 
-    /// How the cameras have moved at each frame but the first, and the file that says so, if there is one.
+    /// Reads how the cameras move from frame to frame, if --prior-pose says it.
     pub(crate) fn way(&self, view: PriorView) -> Result<Option<Way>> {
         let Some(file) = &self.prior_pose else { return Ok(None) };
         let needed = || Failure::usage(POSE, "moves the last frame, which needs a calibration; add one");
@@ -184,7 +184,7 @@ impl PriorArgs {
         Ok(Some(Way { file: file.clone(), rig, motions: motions.collect() }))
     }
 
-    /// Why the cameras are needed to move the last frame, if they are.
+    /// The flag that needs a calibration to move the last frame, if it is given.
     pub(crate) fn need_of_way(&self) -> Option<CameraNeed> {
         let with_unit = self.prior_unit.is_some();
         self.prior_pose.as_ref().map(|_| CameraNeed { flag: POSE.into(), unit: with_unit })
@@ -212,7 +212,8 @@ impl PriorArgs {
 
     fn at<'a>(&'a self, path: &'a Path) -> PriorFile<'a> {
         let &Self { prior_sigma: sigma, prior_kind: kind, prior_unit: unit, .. } = self;
-        PriorFile { path, sigma, kind, unit, pose: self.prior_pose.as_deref(), placed: None, names: FLAGS }
+        let pose = self.prior_pose.as_deref().map(CloudPose::File);
+        PriorFile { path, sigma, kind, unit, pose, names: FLAGS }
     }
 }
 
@@ -221,7 +222,7 @@ pub(crate) struct Way {
     pub(crate) file: PathBuf,
     /// The cameras, with points in the frame of the left camera that took the image.
     pub(crate) rig: Rig,
-    /// What takes points of each frame into the next, in the unit of the baseline.
+    /// The motion from each frame to the next, which points of the scene seem to make. Lengths are in the unit of the baseline.
     pub(crate) motions: Vec<Pose>,
 }
 
@@ -254,6 +255,13 @@ pub(crate) struct PriorNames {
     pub(crate) pose: &'static str,
 }
 
+/// Where the pose of a point cloud comes from.
+#[derive(Clone, Copy)]
+pub(crate) enum CloudPose<'a> {
+    File(&'a Path),
+    Known(Pose),
+}
+
 /// A file of known disparities, and how to use it.
 #[derive(Clone, Copy)]
 pub(crate) struct PriorFile<'a> {
@@ -264,9 +272,7 @@ pub(crate) struct PriorFile<'a> {
     /// The unit of lengths in the file.
     pub(crate) unit: Option<LengthUnit>,
     /// The pose of a point cloud.
-    pub(crate) pose: Option<&'a Path>,
-    /// What the file of the pose says, if it was read already.
-    pub(crate) placed: Option<Pose>,
+    pub(crate) pose: Option<CloudPose<'a>>,
     pub(crate) names: PriorNames,
 }
 
@@ -332,9 +338,10 @@ impl PriorFile<'_> {
 
     /// The points of a cloud that the left view sees.
     fn cloud(&self, view: PriorView, rig: &Rig) -> Result<Prior> {
-        let pose = match self.placed {
-            Some(pose) => Some(pose),
-            None => self.pose.map(pose::read).transpose()?,
+        let pose = match self.pose {
+            Some(CloudPose::File(file)) => Some(pose::read(file)?),
+            Some(CloudPose::Known(pose)) => Some(pose),
+            None => None,
         };
         let (scale, sigma) = (self.scale(rig), self.sigma_of(PriorKind::Points));
         let points = CloudPoints { size: view.size, rig: *rig, pose, scale, sigma };
@@ -368,7 +375,7 @@ impl PriorFile<'_> {
         let kind = self.kind().unwrap_or_else(|| PriorKind::of_map(&map));
         let sigma = self.sigma_of(kind);
         let (own, (width, _)) = (map.size().0, view.size);
-        let stretch = if self.unit.is_some() || own == width { 1.0 } else { width as f32 / own as f32 };
+        let stretch = if self.unit.is_some() { 1.0 } else { width as f32 / own as f32 };
         let prior = Prior::resized(kind, &map.map(|d| d * stretch), view.size, sigma);
         prior.map_err(|e| self.of_library(e))
     }

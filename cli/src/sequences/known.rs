@@ -138,16 +138,16 @@ impl Follow {
         self.0.is_some()
     }
 
-    /// What the maps of frame `done` tell of the next. Where the way has ended, that is nothing.
+    /// The prior of the frame after `done`, from the maps of frame `done`. Without a pose for that frame there is none.
     ///
     /// # Errors
-    /// Those of the cameras.
+    /// The errors of [`Rig::prior_after`](mrfgs::depth::Rig::prior_after).
     pub(crate) fn next(&self, done: usize, maps: &Maps) -> mrfgs::Result<Option<Prior>> {
         let Some(way) = &self.0 else { return Ok(Some(Prior::of_maps(maps))) };
         way.motions.get(done).map(|motion| way.rig.prior_after(maps, motion)).transpose()
     }
 
-    /// The warning that the way ends before the frames do, if it does so with frame `done`.
+    /// The warning that the file has no pose for frame `done` (from 0) and later ones, if `done` is the first of them.
     pub(crate) fn ended(&self, done: usize) -> Option<String> {
         let way = self.0.as_ref().filter(|way| way.motions.len() + 1 == done)?;
         let file = way.file.display();

@@ -199,7 +199,7 @@ fn a_folder_takes_one_match() {
         .failed(2, "mine: the folder holds other files; give a new one");
     run(&folder, &line("other.pfm", "--shard 1/2")).failed(2, "--blocks");
 
-    // What can be read once cannot be recognized by the next run.
+    // A pipe can be read only once, so the next run could not tell whether its image is the same.
     #[cfg(target_os = "linux")]
     run(&folder, &line("other.pfm", "--blocks new").replace("left.tif", "/dev/null"))
         .failed(1, "/dev/null: is no file");

@@ -9,7 +9,7 @@ use mrfgs::image::read::Reader;
 use mrfgs::rectification::Options;
 use mrfgs::{Error, Prior};
 
-use crate::args::{CropArgs, PriorFile, PriorNames, PriorView, Search, Sign};
+use crate::args::{CloudPose, CropArgs, PriorFile, PriorNames, PriorView, Search, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, Files};
 use crate::pairs::folder::{self, CALIBRATION, Folder};
@@ -234,7 +234,7 @@ impl Listed {
 /// The prior of a row, whose files are at these paths.
 fn prior_file<'a>(row: &PriorRow, path: &'a Path, pose: Option<&'a Path>) -> PriorFile<'a> {
     let &PriorRow { sigma, kind, unit, .. } = row;
-    PriorFile { path, sigma, kind, unit, pose, placed: None, names: PRIOR_COLUMNS }
+    PriorFile { path, sigma, kind, unit, pose: pose.map(CloudPose::File), names: PRIOR_COLUMNS }
 }
 
 pub(super) fn shown(path: &Path) -> String {
