@@ -53,6 +53,14 @@ impl Rig {
         Ok(Self { camera, doffs, baseline, unit, to_original: None, frame: PointFrame::Matched })
     }
 
+    /// The values that it was made from: focal lengths, principal point and doffs in pixels, and the baseline with its unit. The inverse of
+    /// [`Rig::new`].
+    #[must_use]
+    pub fn calibration(&self) -> Calibration {
+        let of_cameras = Calibration::of_cameras(self.camera, self.baseline, self.unit);
+        Calibration { doffs: Some(self.doffs), ..of_cameras }
+    }
+
     /// The rig with the rotation of the original left camera, to which third cameras in [`Rig::registered`]
     /// refer. `rectifying` is the rotation from that camera to the rectified one, the first of
     /// [`Rectification::rotations`](crate::rectification::Rectification::rotations).
@@ -289,6 +297,14 @@ mod tests {
             doffs: Some(20.0),
             baseline: Some(160.0),
             ..Calibration::default()
+        }
+    }
+
+    #[test]
+    fn a_rig_gives_its_calibration_back() {
+        let metres = Calibration { unit: Unit::Metre, ..calibration() };
+        for known in [calibration(), metres] {
+            assert_eq!(Rig::new(&known).unwrap().calibration(), known);
         }
     }
 
