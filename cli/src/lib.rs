@@ -29,7 +29,7 @@ use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
 use commands::{
     batch, bench, completions, demo, depth, devices, evaluate, inspect, man, r#match, presets, rectify, ros,
-    sequence,
+    sequence, view,
 };
 use failure::Failure;
 pub use pairs::list;
@@ -43,8 +43,8 @@ points.";
 
 const EXAMPLES: &str = "\
 Examples:
-  # Two hand-held photos; map.preview.png shows the map in colours:
-  mrfgs match a.jpg b.jpg map.pfm --rectify --also preview
+  # Two hand-held photos; the browser shows the map and the surface:
+  mrfgs match a.jpg b.jpg map.pfm --rectify --show
   # Try it on a built-in pair:
   mrfgs demo
   # Images of a calibrated rig, with depth:
@@ -80,6 +80,7 @@ enum Command {
     Match(r#match::Args),
     Rectify(rectify::Args),
     Depth(depth::Args),
+    View(view::Args),
     Sequence(sequence::Args),
     Ros(ros::Args),
     Batch(batch::Args),
@@ -121,6 +122,7 @@ fn run() -> Result<(), Failure> {
         Command::Match(args) => r#match::run(args)?,
         Command::Rectify(args) => rectify::run(args)?,
         Command::Depth(args) => depth::run(&args)?,
+        Command::View(args) => view::run(&args)?,
         Command::Sequence(args) => sequence::run(&args)?,
         Command::Ros(args) => ros::run(&args)?,
         Command::Batch(args) => batch::run(&args)?,
@@ -229,9 +231,10 @@ mod tests {
     #[test]
     fn commands_have_few_flags() {
         let caps = [
-            ("match", 36),
+            ("match", 37),
             ("rectify", 9),
             ("depth", 17),
+            ("view", 11),
             ("sequence", 42),
             ("ros", 33),
             ("batch", 21),

@@ -11,6 +11,15 @@ pub(crate) struct CameraNeed {
     pub(crate) flag: String,
     /// Whether it needs the unit of the baseline.
     pub(crate) unit: bool,
+    /// Whether it uses the cameras if they are known, but does without.
+    pub(crate) optional: bool,
+}
+
+impl CameraNeed {
+    /// The first need that cannot do without cameras, else the first.
+    pub(crate) fn strictest(needs: [Option<Self>; 2]) -> Option<Self> {
+        needs.into_iter().flatten().min_by_key(|need| need.optional)
+    }
 }
 
 /// Flags that give the cameras of a rectified pair in place of a calibration file.

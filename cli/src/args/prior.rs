@@ -187,7 +187,7 @@ impl PriorArgs {
     /// The flag that needs a calibration to move the last frame, if it is given.
     pub(crate) fn need_of_way(&self) -> Option<CameraNeed> {
         let with_unit = self.prior_unit.is_some();
-        self.prior_pose.as_ref().map(|_| CameraNeed { flag: POSE.into(), unit: with_unit })
+        self.prior_pose.as_ref().map(|_| CameraNeed { flag: POSE.into(), unit: with_unit, optional: false })
     }
 
     fn check_sigma(&self) -> Result<()> {
@@ -281,7 +281,11 @@ impl PriorFile<'_> {
     pub(crate) fn need(&self) -> Option<CameraNeed> {
         let with_unit = self.unit.is_some();
         let flag = if with_unit { self.names.unit } else { self.names.file };
-        (with_unit || is_cloud(self.path)).then(|| CameraNeed { flag: flag.into(), unit: with_unit })
+        (with_unit || is_cloud(self.path)).then(|| CameraNeed {
+            flag: flag.into(),
+            unit: with_unit,
+            optional: false,
+        })
     }
 
     /// Reads the prior for a view, whose cameras must be known if they are needed.

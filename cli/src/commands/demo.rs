@@ -17,10 +17,11 @@ const PAIR: [(&str, &[u8]); 2] = [
     ("right.png", include_bytes!("../../demo/right.png")),
 ];
 /// The flags for this pair.
-const FLAGS: &str = "--max-disparity 47 --focal 240 --baseline 0.186m --also preview,points";
+const FLAGS: &str = "--max-disparity 47 --focal 240 --baseline 0.186m --also view,preview,points";
 
 /// The files that the demo writes, with descriptions.
-const MADE: [(&str, &str); 3] = [
+const MADE: [(&str, &str); 4] = [
+    ("disparity.view.html", "the map and the surface in 3-D, for a browser"),
     ("disparity.preview.png", "the map in colours"),
     ("disparity.points.ply", "a point cloud, for MeshLab, CloudCompare or Blender"),
     ("disparity.pfm", "the disparities in pixels"),
@@ -33,7 +34,7 @@ Examples:
 
 /// Match a built-in pair, and show what to do next
 ///
-/// FOLDER gets the pair, its disparity map, the map in colours, and a point cloud.
+/// FOLDER gets the pair, its disparity map, the map in colours, a page for the browser, and a point cloud.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -71,9 +72,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 This was mrfgs match {shown} {FLAGS}
 
 {made}
-Now try your own pair. Hand-held photos: mrfgs match LEFT RIGHT disparity.pfm --also preview --rectify
-A calibrated stereo camera:              mrfgs match LEFT RIGHT disparity.pfm --also preview --rectify --calib FILE
-Already rectified images:                mrfgs match LEFT RIGHT disparity.pfm --also preview
+Now try your own pair. Hand-held photos: mrfgs match LEFT RIGHT disparity.pfm --show --rectify
+A calibrated stereo camera:              mrfgs match LEFT RIGHT disparity.pfm --show --rectify --calib FILE
+Already rectified images:                mrfgs match LEFT RIGHT disparity.pfm --show
 "
     ))?;
     Ok(())

@@ -1,11 +1,11 @@
 //! `mrfgs depth`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use mrfgs::Error;
 use mrfgs::depth::Rig;
+use mrfgs::image::Plane;
 use mrfgs::image::calib::Calibration;
-use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
 
@@ -85,20 +85,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     files::distinct(&inputs, &named)?;
     let reader = args.reading.reader();
     let map = args.sign.map(disparity(reader, &args.map, args.scale)?);
-    let left = args.left.as_deref().map(|path| left(args, path)).transpose()?;
+    let left = args.left.as_deref().map(|path| input::left(reader, path)).transpose()?;
     let confidence = args.confidence.as_deref().map(|path| reader.grey8(path)).transpose()?;
-    let of_size = |path: &Option<PathBuf>, size: Option<(usize, usize)>| match (path, size) {
-        (Some(path), Some((w, h))) if (w, h) != map.size() => {
-            let (width, height) = map.size();
-            let [path, map] = [path, &args.map].map(|path| path.display());
-            Err(Error::Mismatch(format!(
-                "{path} is {w} x {h} but {map} is {width} x {height}: give files of the same view"
-            )))
-        }
-        _ => Ok(()),
-    };
-    of_size(&args.left, left.as_ref().map(|image| image.pixels.size()))?;
-    of_size(&args.confidence, confidence.as_ref().map(Plane::size))?;
+    let of_left = args.left.as_deref().zip(left.as_ref().map(|image| image.pixels.size()));
+    let of_confidence = args.confidence.as_deref().zip(confidence.as_ref().map(Plane::size));
+    for (path, size) in of_left.into_iter().chain(of_confidence) {
+        input::check_view(path, size, &args.map, map.size())?;
+    }
     let (path, calibration) = calibration(args, map.size())?;
     let known = (path.as_deref().unwrap_or(input::NUMBERS.as_ref()), &calibration);
     let takes_unit = also.iter().find(|word| word.takes_unit()).or(also.first());
@@ -177,12 +170,6 @@ fn calibration(args: &Args, size: (usize, usize)) -> Result<(Option<PathBuf>, Ca
     }
     let reason = format!("missing; there is no calib.txt beside {} either", args.map.display());
     Err(Failure::usage("--calib", reason))
-}
-
-/// The left image. Only its colours matter, so it serves as both views.
-fn left(args: &Args, path: &Path) -> Result<Image> {
-    let raster = args.reading.reader().raster(path)?;
-    Ok(Pair::of_frames(raster.clone(), raster)?.left().clone())
 }
 
 /// The range of the disparities in a map.

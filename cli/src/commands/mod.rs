@@ -15,3 +15,4 @@ pub(crate) mod rectify;
 #[cfg_attr(not(feature = "live"), path = "ros_without_live.rs")]
 pub(crate) mod ros;
 pub(crate) mod sequence;
+pub(crate) mod view;

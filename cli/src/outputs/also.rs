@@ -44,6 +44,8 @@ pub(super) enum Kind {
     Points(PointFrame),
     /// The disparity map in colours, as PNG, with the left image to its left if `beside`.
     Picture { beside: bool },
+    /// The map and its surface, as a page.
+    View,
 }
 
 /// All outputs, in the order in which they are written.
@@ -128,7 +130,25 @@ pub(super) static ALL: &[Also] = &[
     ),
     row("preview", "The disparity map in colours, with a colour bar: .png", Kind::Picture { beside: false }),
     row("side-by-side", "LEFT and the preview side by side: .png", Kind::Picture { beside: true }),
+    VIEW,
 ];
+
+const VIEW: Also = row(
+    "view",
+    "A page to look at: LEFT, the map in colours with its values under the pointer, and the measured surface in 3-D. One .html file \
+     that needs no network",
+    Kind::View,
+);
+
+/// The output of this word.
+pub(crate) fn of_word(word: &str) -> Option<&'static Also> {
+    ALL.iter().find(|also| also.word == word)
+}
+
+/// The page of `--show`.
+pub(crate) fn view() -> &'static Also {
+    &VIEW
+}
 
 const fn row(word: &'static str, help: &'static str, kind: Kind) -> Also {
     Also { word, help, kind, key: None }
@@ -147,7 +167,12 @@ impl Also {
 
     /// Whether each of its values depends on its own pixel alone, so that it can be written by bands of rows.
     pub(crate) fn comes_by_bands(&self) -> bool {
-        !matches!(self.kind, Kind::Registered { .. } | Kind::Points(_) | Kind::Picture { .. })
+        !matches!(self.kind, Kind::Registered { .. } | Kind::Points(_) | Kind::Picture { .. } | Kind::View)
+    }
+
+    /// Whether it is the page.
+    pub(crate) fn is_view(&self) -> bool {
+        matches!(self.kind, Kind::View)
     }
 
     /// Its topic in ROS; `None` if it is never published.
@@ -161,7 +186,7 @@ impl Also {
             Kind::Bytes(_) => Some(messages::of_bytes(self.word)),
             Kind::Registered { millimetres: false } => Some(messages::REGISTERED),
             Kind::Registered { millimetres: true } => Some(messages::REGISTERED_MILLIMETRES),
-            Kind::Points(_) | Kind::Disparity(..) | Kind::Picture { .. } => None,
+            Kind::Points(_) | Kind::Disparity(..) | Kind::Picture { .. } | Kind::View => None,
         }
     }
 
@@ -172,7 +197,7 @@ impl Also {
 
     /// The need of this output for the cameras.
     pub(crate) fn need(&self) -> CameraNeed {
-        CameraNeed { flag: self.flag(), unit: self.takes_unit() }
+        CameraNeed { flag: self.flag(), unit: self.takes_unit(), optional: self.is_view() }
     }
 
     /// Refuses to publish it in ROS if the unit of the baseline of `rig` is unknown.
@@ -200,6 +225,7 @@ impl Also {
             Kind::Depth | Kind::Registered { millimetres: false } | Kind::Sigma(_) => "pfm",
             Kind::Points(_) => self.word.split_once('.').map_or("ply", |(_, extension)| extension),
             Kind::Bytes(_) | Kind::Millimetres | Kind::Registered { .. } | Kind::Picture { .. } => "png",
+            Kind::View => "html",
         };
         output.with_extension(format!("{}.{extension}", self.stem()))
     }
@@ -211,7 +237,7 @@ impl Also {
             Kind::Depth | Kind::Registered { millimetres: false } | Kind::Sigma(_) => {
                 write::check_depth_path(path)
             }
-            Kind::Points(..) => write::check_path(path),
+            Kind::Points(..) | Kind::View => write::check_path(path),
             Kind::Bytes(_) | Kind::Millimetres | Kind::Registered { .. } | Kind::Picture { .. } => {
                 write::check_png_path(path)
             }

@@ -16,11 +16,12 @@ use mrfgs::options::{DisparityRange, Method};
 use serde::{Serialize, Serializer};
 
 use crate::failure::{Failure, Result};
-use crate::outputs::also::{ALL, Also, Kind};
+use crate::outputs::also::{self, ALL, Also, Kind};
 use crate::outputs::empty;
 use crate::outputs::limits::Limits;
 use crate::outputs::messages::{self, Content};
 use crate::outputs::outcome::{Of, Outcome, View};
+use crate::outputs::page::{self, Page};
 use crate::text::plural;
 
 /// The outputs beside the disparity map.
@@ -33,7 +34,7 @@ pub(crate) struct AlsoArgs {
     // Not recorded: the file names tell.
     #[serde(skip)]
     also: Vec<&'static Also>,
-    /// Colour map of the previews [default: turbo]
+    /// Colour map of the previews and of the page [default: turbo]
     #[arg(long, value_name = "NAME", value_parser = colours())]
     #[serde(serialize_with = "colours_in_a_word")]
     colours: Option<ColourMap>,
@@ -51,8 +52,7 @@ pub(crate) struct AlsoArgs {
 fn parser() -> impl TypedValueParser<Value = &'static Also> {
     let words =
         ALL.iter().map(|also| PossibleValue::new(also.word).help(also.help).hide(also.help.is_empty()));
-    PossibleValuesParser::new(words)
-        .try_map(|word| ALL.iter().find(|also| also.word == word).ok_or("no such word"))
+    PossibleValuesParser::new(words).try_map(|word| also::of_word(&word).ok_or("no such word"))
 }
 
 /// The values of `--colours`, with their help.
@@ -104,11 +104,11 @@ impl AlsoArgs {
         third.map(|camera| messages::Third { frame_id: stem.to_string_lossy().into_owned(), camera: *camera })
     }
 
-    /// Refuses --colours without a picture, and points in the original frame without a rectification.
-    pub(crate) fn check(&self, rectifies: bool) -> Result<()> {
+    /// Refuses --colours without a picture, unless the command `shows` a page, and points in the original frame without a rectification.
+    pub(crate) fn check(&self, rectifies: bool, shows: bool) -> Result<()> {
         self.check_clip()?;
-        let is_picture = |also: &Also| matches!(also.kind, Kind::Picture { .. });
-        if self.colours.is_some() && !self.wanted().any(is_picture) {
+        let is_picture = |also: &Also| matches!(also.kind, Kind::Picture { .. } | Kind::View);
+        if self.colours.is_some() && !shows && !self.wanted().any(is_picture) {
             let reason = "needs a preview; add --also preview, or remove --colours";
             return Err(Failure::usage("--colours", reason));
         }
@@ -126,7 +126,7 @@ impl AlsoArgs {
         Ok(method)
     }
 
-    /// The selected output that needs most of the camera: a unit first, else any camera.
+    /// The selected output that takes most of the camera: a unit first, else any camera, else one that can do without.
     pub(crate) fn take_cameras(&self) -> Option<&'static Also> {
         let is_of_cameras = |also: &&Also| {
             matches!(
@@ -135,12 +135,16 @@ impl AlsoArgs {
             )
         };
         let first = || self.wanted().find(is_of_cameras);
-        self.wanted().find(|also| also.takes_unit()).or_else(first)
+        self.wanted()
+            .find(|also| also.takes_unit())
+            .or_else(first)
+            .or_else(|| self.wanted().find(|also| also.is_view()))
     }
 
     /// Whether a selected output shows the left image.
     pub(crate) fn show_left(&self) -> bool {
-        self.wanted().any(|also| matches!(also.kind, Kind::Points(..) | Kind::Picture { beside: true }))
+        self.wanted()
+            .any(|also| matches!(also.kind, Kind::Points(..) | Kind::Picture { beside: true } | Kind::View))
     }
 
     /// The selected outputs for an existing map; depth by default.
@@ -150,7 +154,7 @@ impl AlsoArgs {
     pub(crate) fn of_map(&self) -> Result<Vec<&'static Also>> {
         let mut wanted: Vec<_> = self.wanted().collect();
         if wanted.is_empty() {
-            wanted.extend(ALL.iter().find(|also| also.word == "depth"));
+            wanted.extend(also::of_word("depth"));
         }
         let is_of_map = |also: &&Also| {
             matches!(
@@ -163,6 +167,9 @@ impl AlsoArgs {
             )
         };
         match wanted.iter().find(|also| !is_of_map(also)) {
+            Some(word) if word.is_view() => {
+                Err(Failure::usage(word.flag(), "is what `mrfgs view MAP` makes; use that, or remove it"))
+            }
             Some(word) => {
                 Err(Failure::usage(word.flag(), "can only be computed by a match, not from MAP; remove it"))
             }
@@ -178,7 +185,7 @@ impl AlsoArgs {
 
     /// Refuses --clip-depth without depths or points.
     fn check_clip(&self) -> Result<()> {
-        if self.limits.clip_depth.is_some() && self.take_cameras().is_none() {
+        if self.limits.clip_depth.is_some() && self.take_cameras().is_none_or(Also::is_view) {
             let reason = "needs depths or points; add --also depth or --also points, or remove --clip-depth";
             return Err(Failure::usage("--clip-depth", reason));
         }
@@ -215,7 +222,7 @@ impl AlsoArgs {
 
     /// Refuses outputs that ROS has no message for; `remedy` ends the error.
     pub(crate) fn check_messages(&self, remedy: &str) -> Result<()> {
-        self.check(false)?;
+        self.check(false, false)?;
         match self.wanted().find(|also| also.topic().is_none()) {
             Some(also) => {
                 let reason = format!(
@@ -262,7 +269,7 @@ impl AlsoArgs {
                     Some(Content::Registered(rig.registered(&near(&rig), &camera)))
                 }
             }
-            Kind::Disparity(..) | Kind::Picture { .. } => None,
+            Kind::Disparity(..) | Kind::Picture { .. } | Kind::View => None,
         };
         self.wanted().filter_map(content).collect()
     }
@@ -279,7 +286,7 @@ impl AlsoArgs {
             Kind::Sigma(of) => {
                 outcome.sigmas(of, self.limits).map(|sigmas| Values::Float(sigmas, View::Left))
             }
-            Kind::Registered { .. } | Kind::Points(_) | Kind::Picture { .. } => None,
+            Kind::Registered { .. } | Kind::Points(_) | Kind::Picture { .. } | Kind::View => None,
         }
     }
 
@@ -312,6 +319,16 @@ impl AlsoArgs {
                 return Ok(Some(format!("{count} point{}", plural(count))));
             }
             Kind::Picture { beside } => write::picture(path, &self.picture(beside, outcome))?,
+            Kind::View => Page {
+                map: &outcome.final_map(self.limits),
+                confidence: Some(&maps.confidence),
+                validity: Some(&maps.validity),
+                left,
+                rig,
+                clip_depth: self.limits.clip_depth,
+                colours: self.colours.unwrap_or_default(),
+            }
+            .save(path, &page::name(path))?,
             _ => match self.values(also, outcome) {
                 None => {}
                 Some(Values::Bytes(levels)) => write::picture(path, &levels)?,

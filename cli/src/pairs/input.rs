@@ -7,7 +7,7 @@ use mrfgs::check::{self, Warning};
 use mrfgs::depth::Rig;
 use mrfgs::image::calib::{Calibration, Unit};
 use mrfgs::image::read::Reader;
-use mrfgs::image::{Pair, Rect};
+use mrfgs::image::{Image, Pair, Rect};
 use mrfgs::options::DisparityRange;
 use mrfgs::rectification::{Doubt, Options, Rectification, Trust};
 use mrfgs::region::Region;
@@ -345,7 +345,13 @@ impl<V> Input<V> {
             }
         }
         let known = self.calibration.as_ref().map(KnownCalibration::named);
-        let found = need.map(|need| rig(need, known, left, self.size, self.remedy)).transpose()?;
+        let found = match need {
+            Some(need) if need.optional => {
+                known.and_then(|(_, calibration)| known_rig(calibration, self.size))
+            }
+            Some(need) => Some(rig(need, known, left, self.size, self.remedy)?),
+            None => None,
+        };
         Ok(match self.rectifying() {
             Some(rectifying) => found.map(|rig| rig.rectified_by(&rectifying)),
             None => found,
@@ -465,6 +471,28 @@ pub(crate) fn views(
 fn ordered((pair, is_ordered): (Pair, bool), mask: Option<&Path>) -> Pair {
     let is_swapped = || check::warnings(&pair, None).iter().any(|w| matches!(w, Warning::Swapped { .. }));
     if !is_ordered && mask.is_none() && is_swapped() { pair.exchanged() } else { pair }
+}
+
+/// The left image alone, for its colours.
+pub(crate) fn left(reader: Reader, path: &Path) -> Result<Image> {
+    let raster = reader.raster(path)?;
+    // A pair of frames has the only way from one to an image.
+    Ok(Pair::of_frames(raster.clone(), raster)?.left().clone())
+}
+
+/// Refuses the file `path` of another (width, height) than the map in `map`.
+pub(crate) fn check_view(
+    path: &Path,
+    (w, h): (usize, usize),
+    map: &Path,
+    (width, height): (usize, usize),
+) -> Result<()> {
+    if (w, h) == (width, height) {
+        return Ok(());
+    }
+    let [path, map] = [path, map].map(Path::display);
+    let reason = format!("{path} is {w} x {h} but {map} is {width} x {height}: give files of the same view");
+    Err(Error::Mismatch(reason).into())
 }
 
 /// Assigns the positional arguments after LEFT. If `left` holds both views there is no RIGHT, so the argument in its place is `next`.
@@ -605,6 +633,13 @@ pub(crate) fn rectify_alone(
     })?;
     let pair = by.apply(pair)?;
     Ok((by, pair))
+}
+
+/// The cameras of a `calibration`, if it is complete and for images of this size.
+pub(crate) fn known_rig(calibration: &Calibration, (width, height): (usize, usize)) -> Option<Rig> {
+    let is_of_size = |known: Option<u32>, size: usize| known.is_none_or(|known| known as usize == size);
+    let fits = is_of_size(calibration.width, width) && is_of_size(calibration.height, height);
+    fits.then(|| Rig::new(calibration).ok()).flatten()
 }
 
 /// The cameras for what needs them, from the `calibration` of the pair, whose left image is `left` and has this size.

@@ -168,7 +168,9 @@ pub(crate) fn contradicted(matched: &Matched) -> Option<String> {
 /// Why the cameras are needed, if they are.
 pub(crate) fn need(flags: &PriorArgs, topic: &PriorTopicArgs) -> Result<Option<CameraNeed>> {
     match flags.file() {
-        None if topic.prior_topic.is_some() => Ok(Some(CameraNeed { flag: PRIOR_TOPIC.into(), unit: true })),
+        None if topic.prior_topic.is_some() => {
+            Ok(Some(CameraNeed { flag: PRIOR_TOPIC.into(), unit: true, optional: false }))
+        }
         Some(path) if is_last(path) => Ok(flags.need_of_way()),
         Some(path) if path.is_dir() => Ok(by_name(path)?.values().find_map(|file| flags.need_of(file))),
         _ => Ok(flags.need()),

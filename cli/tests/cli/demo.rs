@@ -20,7 +20,7 @@ fn the_demo_gives_the_map_of_the_command_it_prints() {
         fs::copy(folder.join("mrfgs-demo").join(name), again.join("mrfgs-demo").join(name)).unwrap();
     }
     run(&again, shown).succeeded();
-    for name in ["disparity.pfm", "disparity.preview.png", "disparity.points.ply"] {
+    for name in ["disparity.pfm", "disparity.view.html", "disparity.preview.png", "disparity.points.ply"] {
         told.prints(name);
         let [first, again] =
             [&folder, &again].map(|folder| fs::read(folder.join("mrfgs-demo").join(name)).unwrap());

@@ -42,6 +42,7 @@ mod sequences;
 mod steady;
 mod turned;
 mod unrectified;
+mod view;
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -349,12 +350,13 @@ fn has_gpu() -> bool {
 }
 
 /// The program, its commands and their subcommands.
-const COMMANDS: [&str; 17] = [
+const COMMANDS: [&str; 18] = [
     "",
     "demo",
     "match",
     "rectify",
     "depth",
+    "view",
     "sequence",
     "ros",
     "batch",

@@ -9,7 +9,7 @@ use mrfgs::image::read::Reader;
 use mrfgs::rectification::Options;
 use mrfgs::{Error, Prior};
 
-use crate::args::{CloudPose, CropArgs, PriorFile, PriorNames, PriorView, Search, Sign};
+use crate::args::{CameraNeed, CloudPose, CropArgs, PriorFile, PriorNames, PriorView, Search, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, Files};
 use crate::pairs::folder::{self, CALIBRATION, Folder};
@@ -198,7 +198,8 @@ impl Listed {
         let prior_path = self.prior().map(|prior| at(&prior.file));
         let prior = self.prior().zip(prior_path.as_deref());
         let prior = prior.map(|(row, path)| prior_file(row, path, pose.as_deref()));
-        let need = given.cameras.map(Also::need).or_else(|| prior.as_ref().and_then(PriorFile::need));
+        let of_prior = prior.as_ref().and_then(PriorFile::need);
+        let need = CameraNeed::strictest([given.cameras.map(Also::need), of_prior]);
         let beside = Some(&*left_image).filter(|_| need.is_some() || search.takes_calibration());
         let input = input::Input::new(
             pair,

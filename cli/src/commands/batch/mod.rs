@@ -105,7 +105,7 @@ fn owned(name: &str) -> Vec<String> {
 impl<'a> Batch<'a> {
     /// The batch and its pairs.
     fn new(args: &'a Args) -> Result<(Self, Vec<Listed>)> {
-        args.maps.also.check(args.rectify)?;
+        args.maps.also.check(args.rectify, false)?;
         let method = args.maps.also.made_by(args.method.method()?)?;
         let List { base, pairs } = List::read(&args.list)?;
         let given = BatchSettings {

@@ -10,8 +10,8 @@ use crate::pairs::input::PairArgs;
 
 const EXAMPLES: &str = "\
 Examples:
-  # Two hand-held photos, and the map in colours:
-  mrfgs match l.jpg r.jpg d.pfm --rectify --also preview
+  # Two hand-held photos, and the result in the browser:
+  mrfgs match l.jpg r.jpg d.pfm --rectify --show
   # Raw images and a calibration, with depth:
   mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
   # Rectified images, with a range of disparities:
@@ -59,6 +59,7 @@ Examples:
 /// a calibration whose doffs is 0.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
 pub(crate) struct Args {
     #[command(flatten)]
     pub(super) pair: PairArgs,
@@ -96,6 +97,10 @@ pub(crate) struct Args {
 
     #[command(flatten)]
     pub(super) also: AlsoArgs,
+    /// Opens the page of --also view in the browser at the end: the map and the surface in 3-D. Without --also view, the page goes to the
+    /// folder for temporary files
+    #[arg(long, help_heading = "More outputs")]
+    pub(super) show: bool,
     /// Writes a record of the match and its result as JSON; `-` prints it
     ///
     /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `prior`, `output`), `rectified`, `trust` (rectified
@@ -112,5 +117,10 @@ pub(crate) struct Args {
 impl Args {
     pub(super) fn output(&self) -> &Path {
         self.output.as_deref().expect("`run` has refused a command line without it")
+    }
+
+    /// Whether an output shows the left image.
+    pub(super) fn show_left(&self) -> bool {
+        self.show || self.also.show_left()
     }
 }

@@ -21,7 +21,7 @@ use serde::Serialize;
 use tempfile::TempDir;
 
 use super::args::Args;
-use super::outputs::{check_outputs, record_files, say_end, write_outputs};
+use super::outputs::{check_outputs, record_files, say_end, show, write_outputs};
 use super::request::Request;
 use crate::args::{CameraArgs, CropArgs, PriorArgs, PriorView, ReadingArgs, RectificationArgs, Search, Sign};
 use crate::blocks::{Bands, BlockFiles, BlockFolder, BlockRecord, Fingerprint, Known};
@@ -301,16 +301,18 @@ impl BlockRun<'_> {
         );
         record.rectified = args.rectify;
         record.trust = input.rectification.as_ref().and_then(|by| by.trust().copied());
-        let by_bands =
-            !files::is_printed(args.output()) && also.iter().all(|(word, _)| word.comes_by_bands());
+        let by_bands = !files::is_printed(args.output())
+            && !args.show
+            && also.iter().all(|(word, _)| word.comes_by_bands());
         let said = if by_bands {
             self.write_by_bands(also, &template, &record)?
         } else {
             let maps = self.whole()?;
-            let pair =
-                args.also.show_left().then(|| input.pair.window(&Rect::whole(files.size()))).transpose()?;
+            let pair = args.show_left().then(|| input.pair.window(&Rect::whole(files.size()))).transpose()?;
             let outcome = template.outcome(&maps, pair.as_ref().map(mrfgs::Pair::left));
-            write_outputs(args, also, &outcome, &record)?
+            let said = write_outputs(args, also, &outcome, &record)?;
+            show(args, also, &outcome);
+            said
         };
         say_end(
             args,

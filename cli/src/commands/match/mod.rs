@@ -23,7 +23,7 @@ use crate::pairs::large::{LargePair, PairFiles, UnreadPair};
 use crate::{console, matching, plan, stop};
 
 pub(crate) use args::Args;
-use outputs::{check_outputs, check_range, record_files, say_end, write_outputs};
+use outputs::{check_outputs, check_range, record_files, say_end, show, write_outputs};
 use request::Request;
 
 pub(crate) fn run(mut args: Args) -> Result<()> {
@@ -150,7 +150,7 @@ fn run_on(request: &Request, input: Input, read: Rect) -> Result<()> {
     let rectifying = input.rectifying();
     let trust = input.rectification.as_ref().and_then(|by| by.trust().copied());
     drop(input);
-    let pair = Some(pair).filter(|_| args.also.show_left());
+    let pair = Some(pair).filter(|_| args.show_left());
     let left = pair.as_ref().map(Pair::left);
     let (maps, sign, sigma) = (&matched.maps, args.sign, Some(Sigma::for_method(method)));
     let outcome = Outcome { maps, range, sign, left, rig, rectifying, third: *third, sigma, georeferences };
@@ -160,5 +160,6 @@ fn run_on(request: &Request, input: Input, read: Rect) -> Result<()> {
     record.trust = trust;
     let said = write_outputs(args, &also, &outcome, &record)?;
     say_end(args, &outcome, is_found, unit.as_deref(), &said);
+    show(args, &also, &outcome);
     Ok(())
 }

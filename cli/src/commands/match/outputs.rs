@@ -8,7 +8,9 @@ use mrfgs::options::DisparityRange;
 use super::args::Args;
 use crate::console;
 use crate::failure::{Failure, Result};
-use crate::outputs::{Also, Files, InFront, MatchRecord, Outcome, View, Written, files, other_sign};
+use crate::outputs::{
+    Also, Files, InFront, MatchRecord, Outcome, View, Written, also, files, other_sign, page,
+};
 use crate::pairs::input::Input;
 
 /// The paths of the match, for a record.
@@ -79,6 +81,23 @@ pub(super) fn check_range(args: &Args, range: DisparityRange) -> Result<()> {
         write::check_disparity_path(output, range.min, range.max)?;
     }
     Ok(args.also.wanted().try_for_each(|word| word.check(&word.beside(output), range))?)
+}
+
+/// Shows the page in the browser if --show asks for it. The outputs are there already, so a failure is only said.
+pub(super) fn show(args: &Args, also: &[(&Also, PathBuf)], outcome: &Outcome) {
+    if !args.show {
+        return;
+    }
+    let output = args.output();
+    let name = if files::is_printed(output) { "map".into() } else { page::name(output) };
+    let page = match also.iter().find(|(word, _)| word.is_view()) {
+        Some((_, path)) => Ok(path.clone()),
+        None => page::aside(&name, |path| args.also.write(also::view(), path, outcome).map(|_| ())),
+    };
+    match page {
+        Ok(path) => page::show(&path, args.quiet),
+        Err(failure) => console::say(&format!("--show: {failure}")),
+    }
 }
 
 /// Writes all outputs, or none. Returns remarks about depths and points.

@@ -10,7 +10,7 @@ use mrfgs::region::Blocks;
 use super::args::Args;
 use crate::args::CameraNeed;
 use crate::failure::{Failure, Result};
-use crate::outputs::{Also, files};
+use crate::outputs::{Also, also, files};
 use crate::pairs::input::Input;
 use crate::pairs::large::PairFiles;
 use crate::pairs::views::Views;
@@ -22,9 +22,9 @@ pub(super) struct Request<'a> {
     pub(super) method: Method,
     /// How raw images are rectified, if they are.
     pub(super) rectifying: Option<Options>,
-    /// An output that needs the cameras, if there is one.
+    /// An output that takes the cameras, if there is one.
     pub(super) cameras: Option<&'static Also>,
-    /// What needs the cameras: an output or a prior.
+    /// What takes the cameras: an output or a prior.
     pub(super) need: Option<CameraNeed>,
     /// The camera of `--into`.
     pub(super) third: Option<ThirdCamera>,
@@ -35,13 +35,13 @@ impl<'a> Request<'a> {
         // First, since it also limits the threads that read the images.
         let execution = args.execution.execution();
         let method = args.also.made_by(args.method.method()?)?;
-        let cameras = args.also.take_cameras();
+        let cameras = args.also.take_cameras().or(args.show.then(also::view));
         let rectifying = args.rectification.options_if(args.rectify)?;
-        args.also.check(args.rectify)?;
+        args.also.check(args.rectify, args.show)?;
         let third = args.also.third()?;
-        let need = cameras.map(Also::need).or_else(|| args.prior.need());
+        let need = CameraNeed::strictest([cameras.map(Also::need), args.prior.need()]);
         if args.rectify && args.pair.calib.is_empty() {
-            let flag = need.as_ref().map(|need| need.flag.clone());
+            let flag = need.as_ref().filter(|need| !need.optional).map(|need| need.flag.clone());
             let flag = flag.or(args.numbers.flag().map(str::to_owned));
             if let Some(flag) = flag {
                 let reason = "without a calibration there is no scale and so no depth; add --calib FILE";

@@ -17,8 +17,8 @@ use mrfgs::steady::Steady;
 use mrfgs::{Error, Matcher};
 
 use crate::args::{
-    CameraArgs, CropArgs, ExecutionArgs, MethodArgs, PRIOR_TOPIC, PriorArgs, PriorTopicArgs, PriorView,
-    ReadingArgs, RecordingArgs, RectificationArgs, RegionArgs, Search, Sign,
+    CameraArgs, CameraNeed, CropArgs, ExecutionArgs, MethodArgs, PRIOR_TOPIC, PriorArgs, PriorTopicArgs,
+    PriorView, ReadingArgs, RecordingArgs, RectificationArgs, RegionArgs, Search, Sign,
 };
 use crate::failure::{Failure, Result};
 use crate::outputs::messages::Messages;
@@ -209,7 +209,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     // Unrectified images of a recording are rectified by the calibration in it.
     let rectify = args.rectify || texts.is_some() && recorded.as_ref().is_some_and(|one| !one.is_rectified());
     if kind == Kind::Folder {
-        args.maps.also.check(rectify)?;
+        args.maps.also.check(rectify, false)?;
     }
     let third = args.maps.also.third()?;
     let mut method = args.maps.also.made_by(args.method.method()?)?;
@@ -255,7 +255,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         input.say_range(sign, " of the first frame");
     }
     // Messages with cameras and --recalibrate use a calibration if there is one, but do not require all of it.
-    let need = cameras.map(Also::need).or(prior_need);
+    let need = CameraNeed::strictest([cameras.map(Also::need), prior_need]);
     let known = if need.is_none() && (kind.takes_messages() || args.recalibrate) {
         None
     } else {
@@ -379,7 +379,7 @@ fn calibration_of(recorded: &Recorded, args: &Args) -> Result<Option<Vec<(PathBu
         return Ok(found.filter(|_| counts));
     }
     let path = recorded.path().display();
-    if let Some(word) = args.maps.also.take_cameras() {
+    if let Some(word) = args.maps.also.take_cameras().filter(|word| !word.need().optional) {
         let reason = format!(
             "needs camera values, but {path} lacks a calibration of both cameras (on topics such as {beside}); add --calib, or --focal and \
              --baseline"
