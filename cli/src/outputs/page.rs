@@ -23,7 +23,7 @@ use crate::failure::Result;
 /// The page without its data.
 const TEMPLATE: &str = include_str!("page.html");
 /// Stands for the data in the template.
-const PLACE: &str = "DATA";
+const PLACE: &str = "{{DATA}}";
 /// About the most pixels of a page; browsers hold no more of them in a canvas. Of a larger map it shows every so many rows and columns.
 const MOST: usize = 1 << 24;
 
@@ -119,7 +119,7 @@ impl Page<'_> {
             reasons: REASONS.map(|(bit, name, _)| (bit, name)),
         };
         let data = serde_json::to_string(&data).map_err(|e| Error::write(path, e.to_string()))?;
-        // A name may hold the end of a script.
+        // A name may hold what begins a comment or a script.
         let data = data.replace('<', "\\u003c");
         Ok(write::save(path, TEMPLATE.replacen(PLACE, &data, 1).as_bytes())?)
     }

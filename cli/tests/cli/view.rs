@@ -171,6 +171,20 @@ fn a_stored_map_gives_the_same_page() {
     assert_eq!(negated["cameras"], of_match["cameras"]);
 }
 
+/// The name of a file is no part of the markup.
+#[cfg(unix)]
+#[test]
+fn names_stay_names() {
+    let folder = Folder::new();
+    let name = "a<!--<script>{{DATA}}&'\"";
+    let map = format!("{name}.pfm");
+    fs::write(folder.join(&map), pfm::encode(&Plane::filled(4, 3, 2.0))).unwrap();
+    run(&folder, &format!("view {map} --output d.html")).succeeded();
+    let page = page(folder.join("d.html"));
+    assert_eq!(data(&page)["name"], name);
+    assert_eq!(page.matches("<!--").count(), 1, "the comment of the template");
+}
+
 /// Of a map that is too large for a browser, the page holds every second column and row.
 #[test]
 fn large_maps_are_thinned() {
@@ -199,8 +213,8 @@ fn each_pair_of_a_batch_has_its_page() {
     }
 }
 
-/// The only file in the folders of the folder for temporary files.
-#[cfg(unix)]
+/// The only file in the folders of `temporary`.
+#[cfg(target_os = "linux")]
 fn only_page(temporary: &Path) -> PathBuf {
     let all: Vec<_> = listing(temporary).into_iter().filter(|(_, content)| content.is_some()).collect();
     let [(path, _)] = &all[..] else { panic!("{} files", all.len()) };
@@ -208,7 +222,7 @@ fn only_page(temporary: &Path) -> PathBuf {
 }
 
 /// A program named xdg-open in `folder` that runs these lines of a shell.
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 fn opener(folder: &Path, lines: &str) {
     use std::os::unix::fs::PermissionsExt;
     fs::create_dir_all(folder.join("bin")).unwrap();
