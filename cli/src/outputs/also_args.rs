@@ -109,7 +109,7 @@ impl AlsoArgs {
         self.check_clip()?;
         let is_picture = |also: &Also| matches!(also.kind, Kind::Picture { .. } | Kind::View);
         if self.colours.is_some() && !shows && !self.wanted().any(is_picture) {
-            let reason = "needs a preview; add --also preview, or remove --colours";
+            let reason = "needs a picture; add --also preview or --also view, or remove --colours";
             return Err(Failure::usage("--colours", reason));
         }
         let is_original = |also: &&Also| matches!(also.kind, Kind::Points(PointFrame::Original));

@@ -11,7 +11,7 @@ const TOO_MANY: &str = "240 x 180 & at most 43199 & raise --max-pixels";
 /// `R` for a `match` of raw images.
 const FAILURES: &[Failure] = &[
     // The command line.
-    ("", 2, "command & match, rectify, depth, sequence, ros, batch & --help"),
+    ("", 2, "command & match, rectify, depth, view, sequence, ros, batch & --help"),
     ("frobnicate", 2, "frobnicate & --help"),
     ("match left.png", 2, "RIGHT & missing & left.png holds one view"),
     ("completions", 2, "<SHELL> & mrfgs completions --help"),
