@@ -22,7 +22,8 @@ impl Rectification {
     /// of one camera that was moved to the side by hand.
     ///
     /// Both images are assumed to be from one pinhole camera with its axis in the middle; its focal length and
-    /// motion are estimated (Fusiello and Irsara 2008), and the views are then chosen as in [`Rectification::new`].
+    /// motion are estimated (Fusiello and Irsara 2008), and a zoom between the images if the motion were unlikely without it. The
+    /// views are then chosen as in [`Rectification::new`].
     /// Points at infinity have a disparity of about 0, or of some pixels of either sign if the matches determine
     /// the focal length poorly. There is no scale, so [`Rectification::calibration`] is an error.
     ///
@@ -70,7 +71,7 @@ impl Rectification {
     /// Rotates the right view alone, counter-clockwise by an angle in radians: to search views that differ by about that.
     pub(crate) fn turning_right(size: (usize, usize), angle: f64) -> Result<Self> {
         let start = TwoViews::start(size);
-        let lens = start.lens()?;
+        let [lens, _] = start.lenses()?;
         let camera = Camera { focal_length: lens.focal_length, principal_point: lens.principal_point };
         let views = RectifiedViews {
             rotations: [IDENTITY, rotation([0.0, 0.0, -angle])],
@@ -97,15 +98,15 @@ impl Rectification {
         size: (usize, usize),
         options: &Options,
     ) -> Result<Self> {
-        let lens = found.lens()?;
-        let views = views::choose(&[lens; 2], &found.pose(agreeing), size, options);
+        let lenses = found.lenses()?;
+        let views = views::choose(&lenses, &found.pose(agreeing), size, options);
         views
             .and_then(
                 |views| {
                     if views.is_exchanged() { Err(RectificationError::Forward.into()) } else { Ok(views) }
                 },
             )
-            .and_then(|views| Self::of_views(&[lens; 2], views, [size; 2], Unit::default(), Vec::new()))
+            .and_then(|views| Self::of_views(&lenses, views, [size; 2], Unit::default(), Vec::new()))
             .map_err(|_| RectificationError::Forward.into())
     }
 

@@ -3,7 +3,8 @@
 //! Both views are pinholes of one unknown focal length, with the principal point in the middle: Fusiello and
 //! Irsara, *Quasi-Euclidean Uncalibrated Rectification of Images* (2008). The pose is estimated from random
 //! samples (RANSAC, Fischler and Bolles 1981, with the truncated error of Torr and Zisserman's MSAC, 2000),
-//! and then by least squares of Sampson's distance over all matches, weighted as by Geman and `McClure`.
+//! and then by least squares of Sampson's distance over all matches, weighted as by Geman and `McClure`. If it
+//! is unlikely, the right view may have another focal length, as of a phone that has focused anew.
 //!
 //! The samples are the same in every run, sums have a fixed order, and only + - * /, square roots and `libm`
 //! are used: the same bits on every machine, with any number of threads.
@@ -23,7 +24,7 @@ pub type Correspondence = [[f64; 2]; 2];
 
 /// Number of random samples from each start.
 const SAMPLES: u64 = 400;
-/// Matches per sample: one more than the unknowns of the geometry with a fixed focal length.
+/// Matches per sample: one more than the unknowns of the geometry with a fixed focal length and no zoom.
 const SAMPLE: usize = 6;
 /// Iterations of least squares on a sample, and on all matches.
 const STEPS: [usize; 2] = [6, 30];
@@ -33,8 +34,12 @@ const FOCAL_LENGTH: f64 = 1.0;
 /// the focal length, and rotations of both views about an axis across the motion, poorly if disparities are
 /// nearly the same or a lens bends lines. They determine everything else so well that the prior does not count.
 const COST: f64 = 0.1;
-/// Standard deviations of the priors: log of the focal length, rotation in radians, forward motion (open).
-const UNUSUAL: [f64; 3] = [1.0, 0.1, 0.2];
+/// Standard deviations of the priors: log of the focal length, rotation in radians, forward motion, log of the zoom (open).
+const UNUSUAL: [f64; 4] = [1.0, 0.1, 0.2, 0.03];
+/// A zoom is tried if the sum of the squared deviations from the priors is above this, and taken if it costs less and leaves this share of
+/// the deviations (open). Without it, a long lens, a turned camera and a step forward imitate a zoom.
+const UNLIKELY: f64 = 2.0;
+const CONVINCING: f64 = 0.6;
 
 /// Two views of one camera.
 #[derive(Clone, Copy, Debug)]
@@ -43,13 +48,20 @@ pub(super) struct TwoViews {
     rotation: Matrix,
     /// The position of the left view in the frame of the right one: a unit vector.
     direction: [f64; 3],
-    /// In pixels.
+    /// Of the left view, in pixels.
     focal_length: f64,
+    /// The focal length of the right view, relative to the left one.
+    zoom: f64,
+    /// Whether the zoom is unknown; otherwise it is 1.
+    zooms: bool,
     size: (usize, usize),
 }
 
-/// The unknowns of [`TwoViews::moved`]: three of the rotation, two of the direction, the focal length.
-const UNKNOWNS: usize = 6;
+/// The unknowns of [`TwoViews::moved`]: three of the rotation, two of the direction, the focal length, the zoom.
+const UNKNOWNS: usize = 7;
+/// The places of the last two.
+const FOCAL: usize = 5;
+const ZOOM: usize = 6;
 
 impl TwoViews {
     /// Largest distance of an agreeing match from its epipolar line, in pixels: the accuracy of matches in
@@ -62,6 +74,22 @@ impl TwoViews {
 
     /// The geometry of views of `size` that most `matches` support; `None` of fewer than a sample.
     pub(super) fn estimate(matches: &[Correspondence], size: (usize, usize)) -> Option<Self> {
+        let found = Self::searched(matches, size)?;
+        if found.deviation() <= UNLIKELY || found.is_forward() {
+            return Some(found);
+        }
+        let scale = Self::tolerance(size) / 2.0;
+        let mut zoomed = Self { rotation: found.rotation, zooms: true, ..Self::start(size) };
+        for scale in [8.0, 2.0, 1.0].map(|times| times * scale) {
+            zoomed = zoomed.fitted(matches, STEPS[1], Some(scale));
+        }
+        let is_likelier = zoomed.deviation() <= CONVINCING * found.deviation();
+        let costs_less = zoomed.cost(matches, Some(scale)) < found.cost(matches, Some(scale));
+        Some(if is_likelier && costs_less { zoomed } else { found })
+    }
+
+    /// The geometry that most `matches` support, if both views have one focal length.
+    fn searched(matches: &[Correspondence], size: (usize, usize)) -> Option<Self> {
         if matches.len() < SAMPLE {
             return None;
         }
@@ -87,17 +115,26 @@ impl TwoViews {
 
     /// The initial geometry: a step to the right, without rotation.
     pub(super) fn start(size: (usize, usize)) -> Self {
-        Self { rotation: IDENTITY, direction: [-1.0, 0.0, 0.0], focal_length: Self::assumed(size), size }
+        Self {
+            rotation: IDENTITY,
+            direction: [-1.0, 0.0, 0.0],
+            focal_length: Self::assumed(size),
+            zoom: 1.0,
+            zooms: false,
+            size,
+        }
     }
 
     fn assumed((width, height): (usize, usize)) -> f64 {
         FOCAL_LENGTH * width.max(height) as f64
     }
 
-    /// The ray of a pixel, in the frame of its view.
-    fn ray(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+    /// The rays of a match, each in the frame of its view.
+    fn rays(&self, [left, right]: &Correspondence) -> ([f64; 3], [f64; 3]) {
         let [cx, cy] = self.principal_point();
-        [(x - cx) / self.focal_length, (y - cy) / self.focal_length, 1.0]
+        let ray =
+            |[x, y]: [f64; 2], focal_length: f64| [(x - cx) / focal_length, (y - cy) / focal_length, 1.0];
+        (ray(*left, self.focal_length), ray(*right, self.zoom * self.focal_length))
     }
 
     /// The middle of both images, in pixels.
@@ -105,9 +142,10 @@ impl TwoViews {
         [self.size.0, self.size.1].map(|side| (side as f64 - 1.0) / 2.0)
     }
 
-    /// The lens of both views.
-    pub(super) fn lens(&self) -> Result<Lens> {
-        Lens::new([self.focal_length; 2], self.principal_point(), Distortion::NONE)
+    /// The lenses of both views.
+    pub(super) fn lenses(&self) -> Result<[Lens; 2]> {
+        let lens = |focal_length: f64| Lens::new([focal_length; 2], self.principal_point(), Distortion::NONE);
+        Ok([lens(self.focal_length)?, lens(self.zoom * self.focal_length)?])
     }
 
     /// E: the rays p and q of a match satisfy q E p = 0.
@@ -121,8 +159,8 @@ impl TwoViews {
         self.distance_by(&self.essential(), of)
     }
 
-    fn distance_by(&self, essential: &Matrix, [left, right]: &Correspondence) -> f64 {
-        let (p, q) = (self.ray(*left), self.ray(*right));
+    fn distance_by(&self, essential: &Matrix, of: &Correspondence) -> f64 {
+        let (p, q) = self.rays(of);
         let (in_right, in_left) = (rotated(essential, p), rotated(&transposed(essential), q));
         let squares = [in_right[0], in_right[1], in_left[0], in_left[1]].map(|v| v * v);
         let norm = squares.iter().sum::<f64>() / 2.0;
@@ -144,18 +182,43 @@ impl TwoViews {
             .sum()
     }
 
-    /// Deviations from the prior: the focal length, the rotation about each axis, and the forward motion.
-    fn unusual(&self) -> [f64; 5] {
-        let [focal_length, turn, forward] = UNUSUAL;
+    /// Deviations from the prior: the focal length, the rotation about each axis, the forward motion, and the zoom.
+    fn unusual(&self) -> [f64; 6] {
+        let [focal_length, turn, forward, zoom] = UNUSUAL;
         let by = rotation_vector(&self.rotation);
         let [_, _, z] = rotated(&rotation(scaled(by, -0.5)), self.direction);
-        let zoom = libm::log(self.focal_length / Self::assumed(self.size));
-        [zoom / focal_length, by[0] / turn, by[1] / turn, by[2] / turn, z / forward]
+        let longer = libm::log(self.focal_length / Self::assumed(self.size));
+        let zoomed = libm::log(self.zoom);
+        [longer / focal_length, by[0] / turn, by[1] / turn, by[2] / turn, z / forward, zoomed / zoom]
+    }
+
+    /// The sum of the squared deviations from the priors.
+    fn deviation(&self) -> f64 {
+        self.unusual().iter().map(|v| v * v).sum()
+    }
+
+    /// What [`TwoViews::fitted`] makes small.
+    fn cost(&self, matches: &[Correspondence], scale: Option<f64>) -> f64 {
+        let essential = self.essential();
+        let of_matches: f64 = matches
+            .iter()
+            .map(|of| {
+                let distance = self.distance_by(&essential, of);
+                let square = distance * distance;
+                scale.map_or(square, |scale| square / (1.0 + square / (scale * scale)))
+            })
+            .sum();
+        of_matches + Self::weight_of_priors(matches, scale) * self.deviation()
+    }
+
+    /// The weight of a squared deviation from a prior.
+    fn weight_of_priors(matches: &[Correspondence], scale: Option<f64>) -> f64 {
+        scale.map_or(0.0, |scale| COST * scale * COST * scale * matches.len() as f64)
     }
 
     /// The views after a small change of the unknowns.
     fn moved(&self, by: [f64; UNKNOWNS]) -> Self {
-        let [x, y, z, a, b, zoom] = by;
+        let [x, y, z, a, b, focal_length, zoom] = by;
         // Two directions perpendicular to the direction of the left view.
         let smallest = (0..3).min_by(|&i, &j| self.direction[i].abs().total_cmp(&self.direction[j].abs()));
         let across = cross(self.direction, IDENTITY[smallest.unwrap_or(0)]);
@@ -165,8 +228,9 @@ impl TwoViews {
         Self {
             rotation: product(&rotation([x, y, z]), &self.rotation),
             direction: scaled(direction, 1.0 / length(direction)),
-            focal_length: self.focal_length * libm::exp(zoom),
-            size: self.size,
+            focal_length: self.focal_length * libm::exp(focal_length),
+            zoom: self.zoom * libm::exp(zoom),
+            ..*self
         }
     }
 
@@ -174,20 +238,8 @@ impl TwoViews {
     /// pixels, matches that are farther off count less, and the focal length changes too; without one it is fixed.
     fn fitted(self, matches: &[Correspondence], steps: usize, scale: Option<f64>) -> Self {
         const STEP: f64 = 1e-6;
-        // The weight of the prior.
-        let each = scale.map_or(0.0, |scale| COST * scale * COST * scale * matches.len() as f64);
-        let cost = |views: &Self| {
-            let essential = views.essential();
-            let of_matches: f64 = matches
-                .iter()
-                .map(|of| {
-                    let distance = views.distance_by(&essential, of);
-                    let square = distance * distance;
-                    scale.map_or(square, |scale| square / (1.0 + square / (scale * scale)))
-                })
-                .sum();
-            of_matches + each * views.unusual().iter().map(|v| v * v).sum::<f64>()
-        };
+        let each = Self::weight_of_priors(matches, scale);
+        let cost = |views: &Self| views.cost(matches, scale);
         let (mut views, mut damping) = (self, 1e-3);
         let mut least = cost(&views);
         for _ in 0..steps {
@@ -218,11 +270,13 @@ impl TwoViews {
                 for (i, value) in views.unusual().into_iter().enumerate() {
                     add(value, unusual.map(|unusual| unusual[i]), each);
                 }
-            } else {
-                let zoom = UNKNOWNS - 1;
-                normal[zoom] = [0.0; UNKNOWNS];
-                (0..UNKNOWNS).for_each(|i| normal[i][zoom] = 0.0);
-                (normal[zoom][zoom], right[zoom]) = (1.0, 0.0);
+            }
+            for (unknown, is_free) in [(FOCAL, scale.is_some()), (ZOOM, self.zooms)] {
+                if !is_free {
+                    normal[unknown] = [0.0; UNKNOWNS];
+                    (0..UNKNOWNS).for_each(|i| normal[i][unknown] = 0.0);
+                    (normal[unknown][unknown], right[unknown]) = (1.0, 0.0);
+                }
             }
             let mut damped = normal;
             (0..UNKNOWNS).for_each(|i| damped[i][i] += damping * (normal[i][i] + f64::MIN_POSITIVE));
@@ -251,10 +305,10 @@ impl TwoViews {
 
     /// Whether most matches are behind a view.
     fn votes_behind(&self, matches: &[Correspondence]) -> bool {
-        let behind = matches.iter().filter(|[left, right]| {
+        let behind = matches.iter().filter(|of| {
             // a p + t = b q, with p rotated into the frame of the right view.
-            let (p, q) = (rotated(&self.rotation, self.ray(*left)), self.ray(*right));
-            let normal = cross(q, p);
+            let (p, q) = self.rays(of);
+            let normal = cross(q, rotated(&self.rotation, p));
             dot(cross(q, self.direction), normal) > 0.0
         });
         2 * behind.count() > matches.len()
@@ -276,7 +330,7 @@ impl TwoViews {
     pub(super) fn share_off_one_plane(&self, matches: &[Correspondence]) -> f64 {
         const ROUNDS: usize = 20;
         let tolerance = Self::tolerance(self.size);
-        let rays: Vec<_> = matches.iter().map(|[left, right]| (self.ray(*left), self.ray(*right))).collect();
+        let rays: Vec<_> = matches.iter().map(|of| self.rays(of)).collect();
         let mut plane = IDENTITY;
         let apart = |plane: &Matrix, p: [f64; 3], q: [f64; 3]| {
             let [x, y, z] = rotated(plane, p);
