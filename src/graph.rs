@@ -115,6 +115,10 @@ impl LevelGraph {
     }
 
     /// The transposed table: where the entries of each pixel start (one more than there are pixels), and the entries.
+    #[cfg_attr(
+        target_arch = "wasm32",
+        expect(clippy::needless_for_each, reason = "one thread has plain iterators")
+    )]
     fn transposed(&self) -> (Vec<u32>, Vec<Incoming>) {
         let (pixels, band) = (self.width * self.height, BAND * self.width);
         let of_band = |i: usize| i * band..((i + 1) * band).min(pixels);

@@ -101,6 +101,7 @@ impl Threads {
     /// # Errors
     /// [`ExecutionError`] for 0 and for more than [`MOST`]; [`MemoryError`](crate::error::MemoryError) if
     /// their stacks do not fit.
+    #[cfg_attr(target_arch = "wasm32", expect(clippy::needless_update, reason = "a browser has no pool"))]
     pub(crate) fn new(count: Option<usize>) -> Result<Self> {
         check(count)?;
         #[cfg(not(target_arch = "wasm32"))]

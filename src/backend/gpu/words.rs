@@ -11,6 +11,10 @@ use wgpu::WriteOnly;
 /// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, in rows of `pitch` words to `memory`.
 /// Returns false if that loses information: if pixels are not in whole 8-bit levels, or grey does not follow from
 /// colour.
+#[cfg_attr(
+    target_arch = "wasm32",
+    expect(clippy::map_all_any_identity, reason = "one thread has plain iterators")
+)]
 pub(super) fn narrow_words(image: &Image, pitch: u32, memory: WriteOnly<'_, [u8]>) -> bool {
     let (width, per_row) = (image.width(), pitch as usize / ALIGN_WORDS);
     // Rows are whole blocks, and a block can move to another thread.

@@ -147,6 +147,10 @@ struct Filter {
 }
 
 impl Filter {
+    #[cfg_attr(
+        target_arch = "wasm32",
+        expect(clippy::modulo_one, reason = "a browser has groups of one line")
+    )]
     fn response(&self, spectrum: &Spectrum) -> Response {
         let [across, down] = &self.inverse;
         let nodes_per_period = [across.len(), down.len()];
