@@ -1,4 +1,4 @@
-// Unpacks the pixels of both views from words with 8 bits per channel: `unpack` at their own size, `halve` at full size and at half of it.
+// Unpacks the pixels of both views from 8 bits per channel, a pixel in each word, or four grey ones: `unpack` at their own size, `halve` at full size and at half of it.
 // One invocation per pixel of the level.
 
 #import band
@@ -10,9 +10,14 @@ struct Params {
     full_pitch: u32,
     // Whether the highest byte of a word counts for nothing.
     is_opaque: u32,
-    // Whether the lowest byte of a word is blue, not red.
-    is_bgra: u32,
+    // What the bytes of a word are: 0 red, green, blue and alpha; 1 blue, green, red and alpha; 2 four grey pixels.
+    format: u32,
+    // The last column of the frame, which the columns behind it repeat.
+    last: u32,
 }
+
+const BGRA = 1u;
+const GREY = 2u;
 
 @group(0) @binding(0) var<uniform> params: Params;
 // red | green << 8 | blue << 16, | 1 << 24 if masked.
@@ -29,7 +34,19 @@ struct Params {
 // red | green << 8 | blue << 16, | the highest byte.
 fn ordered(word: u32) -> u32 {
     let exchanged = (word & 0xff00ff00u) | ((word & 0xffu) << 16u) | ((word >> 16u) & 0xffu);
-    return select(word, exchanged, params.is_bgra != 0u);
+    return select(word, exchanged, params.format == BGRA);
+}
+
+// The place of a pixel in words with rows of `pitch` words.
+fn word_place(x: u32, y: u32, pitch: u32) -> u32 {
+    let column = min(x, params.last);
+    return y * pitch + select(column, column / 4u, params.format == GREY);
+}
+
+// A pixel of its own, from the word that holds it.
+fn single(word: u32, x: u32) -> u32 {
+    let grey = (word >> (8u * (min(x, params.last) % 4u))) & 0xffu;
+    return select(word, grey * 0x10101u, params.format == GREY);
 }
 
 // Colour and grey in 16 bits.
@@ -55,8 +72,10 @@ fn unpack(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
         return;
     }
     let at = id.y * params.level.pixel_pitch + id.x;
-    left[at] = pixel(colours(left_words[at]), is_masked(left_words[at]));
-    right[at] = pixel(colours(right_words[at]), is_masked(right_words[at]));
+    let source = word_place(id.x, id.y, params.level.pixel_pitch);
+    let words = vec2(single(left_words[source], id.x), single(right_words[source], id.x));
+    left[at] = pixel(colours(words.x), is_masked(words.x));
+    right[at] = pixel(colours(words.y), is_masked(words.y));
 }
 
 // The pixel at full size for a word.
@@ -89,8 +108,11 @@ fn halve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     var left_count = 0u;
     var right_count = 0u;
     for (var i = 0u; i < 4u; i++) {
-        let at = (2u * id.y + i / 2u) * params.full_pitch + 2u * id.x + i % 2u;
-        let words = vec2(full_left_words[at], full_right_words[at]);
+        let x = 2u * id.x + i % 2u;
+        let y = 2u * id.y + i / 2u;
+        let at = y * params.full_pitch + x;
+        let source = word_place(x, y, params.full_pitch);
+        let words = vec2(single(full_left_words[source], x), single(full_right_words[source], x));
         full_left[at] = full_pixel(words.x);
         full_right[at] = full_pixel(words.y);
         add(words.x, &left_sum, &left_count);

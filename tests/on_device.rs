@@ -7,7 +7,7 @@ mod common;
 use common::devices;
 use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::on_device::wgpu::{self, util::DeviceExt};
-use mrfgs::on_device::{DeviceMaps, DeviceMatcher, Frame, OpenDevice};
+use mrfgs::on_device::{DeviceMaps, DeviceMatcher, Frame, OpenDevice, PixelFormat};
 use mrfgs::{Matcher, Method};
 use pollster::block_on;
 use std::ops::RangeInclusive;
@@ -35,7 +35,7 @@ fn open() -> Option<OpenDevice> {
 trait OnDevice {
     fn matcher(&self, size: (usize, usize), method: &Method) -> mrfgs::Result<DeviceMatcher>;
     fn texture(&self, view: &Image, format: wgpu::TextureFormat) -> Frame;
-    fn buffer(&self, view: &Image, bytes_per_row: usize, is_bgra: bool) -> Frame;
+    fn buffer(&self, view: &Image, bytes_per_row: usize, format: PixelFormat) -> Frame;
     fn run(&self, maps: DeviceMaps) -> (Plane<i32>, Plane<u32>);
 }
 
@@ -46,7 +46,11 @@ impl OnDevice for OpenDevice {
 
     /// The view as a texture in `format`.
     fn texture(&self, view: &Image, format: wgpu::TextureFormat) -> Frame {
-        let is_bgra = format == wgpu::TextureFormat::Bgra8UnormSrgb;
+        let pixels = match format {
+            wgpu::TextureFormat::Bgra8UnormSrgb => PixelFormat::Bgra,
+            wgpu::TextureFormat::R8Unorm => PixelFormat::Grey,
+            _ => PixelFormat::Rgba,
+        };
         let descriptor = wgpu::TextureDescriptor {
             label: None,
             size: wgpu::Extent3d {
@@ -61,18 +65,18 @@ impl OnDevice for OpenDevice {
             usage: wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         };
-        let bytes = bytes(view, 4 * view.width(), is_bgra);
+        let bytes = bytes(view, size_of_pixel(pixels) * view.width(), pixels);
         let order = wgpu::util::TextureDataOrder::LayerMajor;
         Frame::Texture(self.device.create_texture_with_data(&self.queue, &descriptor, order, &bytes))
     }
 
     /// The view as a buffer whose rows are `bytes_per_row` apart, after 8 other bytes.
-    fn buffer(&self, view: &Image, bytes_per_row: usize, is_bgra: bool) -> Frame {
-        let contents = [vec![7; 8], bytes(view, bytes_per_row, is_bgra)].concat();
+    fn buffer(&self, view: &Image, bytes_per_row: usize, format: PixelFormat) -> Frame {
+        let contents = [vec![7; 8], bytes(view, bytes_per_row, format)].concat();
         let usage = wgpu::BufferUsages::COPY_SRC;
         let descriptor = wgpu::util::BufferInitDescriptor { label: None, contents: &contents, usage };
         let buffer = self.device.create_buffer_init(&descriptor);
-        Frame::Buffer { buffer, offset: 8, bytes_per_row: bytes_per_row as u64, is_bgra }
+        Frame::Buffer { buffer, offset: 8, bytes_per_row: bytes_per_row as u64, format }
     }
 
     /// Submits the commands of a match, and reads its maps: disparities in 1/256 px, confidence and validity.
@@ -100,16 +104,29 @@ impl OnDevice for OpenDevice {
     }
 }
 
-/// The pixels in 8 bits per channel, with an alpha that counts for nothing.
-fn bytes(view: &Image, bytes_per_row: usize, is_bgra: bool) -> Vec<u8> {
+fn size_of_pixel(format: PixelFormat) -> usize {
+    if format == PixelFormat::Grey { 1 } else { 4 }
+}
+
+/// The pixels in 8 bits per channel, with an alpha that counts for nothing; of grey ones the red channel.
+fn bytes(view: &Image, bytes_per_row: usize, format: PixelFormat) -> Vec<u8> {
     let mut bytes = vec![0xa5; bytes_per_row * view.height()];
     for (y, row) in bytes.chunks_exact_mut(bytes_per_row).enumerate() {
-        for (pixel, colour) in row.chunks_exact_mut(4).zip(view.pixels.row(y)) {
+        for (pixel, colour) in row.chunks_exact_mut(size_of_pixel(format)).zip(view.pixels.row(y)) {
             let [r, g, b, _] = colour.map(|v| (v >> 8) as u8);
-            pixel.copy_from_slice(&if is_bgra { [b, g, r, 3] } else { [r, g, b, 3] });
+            match format {
+                PixelFormat::Grey => pixel[0] = r,
+                PixelFormat::Bgra => pixel.copy_from_slice(&[b, g, r, 3]),
+                _ => pixel.copy_from_slice(&[r, g, b, 3]),
+            }
         }
     }
     bytes
+}
+
+/// The view in the grey levels of its red channel.
+fn grey(view: &Image) -> Image {
+    Image::from_rgb8(&view.to_rgb8().map(|&[r, _, _]| [r; 3]))
 }
 
 /// Both views of a rendered scene with odd width and height, and a method that matches them as they are.
@@ -134,6 +151,7 @@ fn expected(pair: &Pair, method: &Method) -> (Plane<i32>, Plane<u32>) {
 
 #[test]
 fn frames_on_a_device_give_the_maps_of_the_same_frames_from_files() {
+    use PixelFormat::{Bgra, Rgba};
     use wgpu::TextureFormat::{Bgra8UnormSrgb, Rgba8Unorm};
     let Some(open) = open() else { return };
     for preset in ["default", "fast"] {
@@ -145,23 +163,49 @@ fn frames_on_a_device_give_the_maps_of_the_same_frames_from_files() {
         let frames: [(&str, View); 5] = [
             ("RGBA", &|view| open.texture(view, Rgba8Unorm)),
             ("BGRA", &|view| open.texture(view, Bgra8UnormSrgb)),
-            ("dense rows", &|view| open.buffer(view, 4 * width, false)),
-            ("aligned rows", &|view| open.buffer(view, (4 * width).next_multiple_of(256), true)),
-            ("wide rows", &|view| open.buffer(view, 4 * width + 12, true)),
+            ("dense rows", &|view| open.buffer(view, 4 * width, Rgba)),
+            ("aligned rows", &|view| open.buffer(view, (4 * width).next_multiple_of(256), Bgra)),
+            ("wide rows", &|view| open.buffer(view, 4 * width + 12, Bgra)),
         ];
         for (name, frame) in frames {
             let maps = matcher.encode(&frame(pair.left()), &frame(pair.right())).unwrap();
             assert!(open.run(maps) == expected, "{preset}, {name}");
         }
         // Control: another order of red and blue gives other maps.
-        let wrong = |view: &Image| open.buffer(view, 4 * width, true);
+        let wrong = |view: &Image| open.buffer(view, 4 * width, Bgra);
         let right = open.texture(pair.right(), Bgra8UnormSrgb);
         let maps = matcher.encode(&open.texture(pair.left(), Bgra8UnormSrgb), &right).unwrap();
         assert!(open.run(maps) == expected, "{preset}");
         let Frame::Buffer { buffer, offset, bytes_per_row, .. } = wrong(pair.left()) else { unreachable!() };
-        let left = Frame::Buffer { buffer, offset, bytes_per_row, is_bgra: false };
+        let left = Frame::Buffer { buffer, offset, bytes_per_row, format: Rgba };
         let maps = matcher.encode(&left, &open.texture(pair.right(), Rgba8Unorm)).unwrap();
         assert!(open.run(maps) != expected, "{preset}");
+    }
+}
+
+#[test]
+fn grey_frames_on_a_device_give_the_maps_of_the_same_frames_from_files() {
+    use PixelFormat::Grey;
+    let Some(open) = open() else { return };
+    for preset in ["default", "fast"] {
+        let (pair, method) = scene(preset);
+        let coloured = expected(&pair, &method);
+        let pair = Pair::new(grey(pair.left()), grey(pair.right())).unwrap();
+        let expected = expected(&pair, &method);
+        // Control: colour matters.
+        assert!(coloured != expected, "{preset}");
+        let mut matcher = open.matcher(pair.size(), &Method::preset(preset).unwrap()).unwrap();
+        let width = pair.size().0.next_multiple_of(4);
+        let frames: [(&str, View); 4] = [
+            ("texture", &|view| open.texture(view, wgpu::TextureFormat::R8Unorm)),
+            ("dense rows", &|view| open.buffer(view, width, Grey)),
+            ("aligned rows", &|view| open.buffer(view, width.next_multiple_of(256), Grey)),
+            ("wide rows", &|view| open.buffer(view, width + 12, Grey)),
+        ];
+        for (name, frame) in frames {
+            let maps = matcher.encode(&frame(pair.left()), &frame(pair.right())).unwrap();
+            assert!(open.run(maps) == expected, "{preset}, {name}");
+        }
     }
 }
 
@@ -181,30 +225,33 @@ fn frames_that_do_not_fit_are_refused() {
     let (pair, method) = scene("fast");
     let (width, height) = pair.size();
     let mut matcher = open.matcher((width, height), &method).unwrap();
-    let good = open.buffer(pair.left(), 4 * width, false);
+    let good = open.buffer(pair.left(), 4 * width, PixelFormat::Rgba);
     let Frame::Buffer { buffer, .. } = &good else { unreachable!() };
     let with = |offset, bytes_per_row| Frame::Buffer {
         buffer: buffer.clone(),
         offset,
         bytes_per_row,
-        is_bgra: false,
+        format: PixelFormat::Rgba,
     };
     let row = 4 * width as u64;
     let small = pair.crop(&Rect { x: 0..20, y: 0..20 });
     let float = open.texture(pair.left(), wgpu::TextureFormat::Rgba8Snorm);
     for (frame, says) in [
         (open.texture(small.left(), wgpu::TextureFormat::Rgba8Unorm), "20 x 20 pixels, not 167 x 91"),
-        (float, "give RGBA or BGRA in 8 bits"),
+        (float, "give RGBA, BGRA or R in 8 bits"),
         (with(8, row - 4), "a row takes 668"),
         (with(6, row), "multiples of 4"),
         (with(12, row), "too few for 167 x 91 pixels"),
         (with(0, u64::MAX - 3), "too few for 167 x 91 pixels"),
-        (open.buffer(pair.left(), 4 * width, true), "give both in one order"),
+        (
+            open.buffer(pair.left(), 4 * width, PixelFormat::Bgra),
+            "one frame is BGRA and the other RGBA; give both in one format",
+        ),
     ] {
         let error = matcher.encode(&frame, &good).unwrap_err().to_string();
         assert!(error.contains(says), "{error}");
     }
-    let maps = matcher.encode(&good, &open.buffer(pair.right(), 4 * width, false)).unwrap();
+    let maps = matcher.encode(&good, &open.buffer(pair.right(), 4 * width, PixelFormat::Rgba)).unwrap();
     assert!(open.run(maps) == expected(&pair, &method), "it goes on after errors");
     for (preset, key, value) in
         [("accurate", "levels", "4"), ("paper", "levels", "3"), ("default", "right-map", "true")]

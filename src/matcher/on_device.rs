@@ -27,7 +27,7 @@
 use super::check::check;
 use crate::backend::Backend;
 use crate::backend::gpu::Gpu;
-pub use crate::backend::gpu::{DeviceMap, Frame, OpenDevice, wgpu};
+pub use crate::backend::gpu::{DeviceMap, Frame, OpenDevice, PixelFormat, wgpu};
 use crate::error::{Error, Result};
 use crate::options::Method;
 use crate::plan::Plan;

@@ -29,10 +29,11 @@ impl Gpu {
         for (side, frame) in ["left", "right"].into_iter().zip(frames) {
             frame.check(size).map_err(|reason| Error::Mismatch(format!("the {side} frame is {reason}")))?;
         }
-        if frames[0].is_bgra() != frames[1].is_bgra() {
-            return Err(Error::Mismatch(
-                "one frame is RGBA and the other BGRA; give both in one order".into(),
-            ));
+        let [left, right] = frames.map(Frame::format);
+        if left != right {
+            return Err(Error::Mismatch(format!(
+                "one frame is {left} and the other {right}; give both in one format"
+            )));
         }
         self.collected = Some(Vec::new());
         let mut state = self.ready(plan)?;
@@ -45,8 +46,9 @@ impl Gpu {
         self.reset(state)?;
         let State { plan, buffers, .. } = &*state;
         let (pitch, rows) = uploaded_rows(plan, buffers);
-        // Pairs that are matched at half their size are extended to an even size by repeating the last column and row.
-        let more = (usize::from(plan.full.is_some() && size.0 % 2 == 1), rows - size.1);
+        // Pairs that are matched at half their size are extended to an even size by repeating the last row here, and the last column as the
+        // words are unpacked.
+        let more = rows - size.1;
         for (frame, data) in frames.into_iter().zip(uploaded_words(plan)) {
             let [(to, place)] = &buffers.rows(plan, data).own()[..] else {
                 let height = size.1;
@@ -56,18 +58,15 @@ impl Gpu {
                     self.device.max_buffer,
                 ));
             };
-            // (first column and row in the frame, first column and row in the view, width and height)
-            let mut parts = vec![([0, 0], [0, 0], [size.0, size.1])];
-            let last = [size.0 - 1, size.1 - 1];
-            parts.extend((more.0 > 0).then_some(([last[0], 0], [size.0, 0], [1, size.1])));
-            parts.extend((more.1 > 0).then_some(([0, last[1]], [0, size.1], [size.0, 1])));
-            parts.extend((more.0 > 0 && more.1 > 0).then_some((last, [size.0, size.1], [1, 1])));
-            for (from, at, part) in parts {
-                let offset = place.start + 4 * (u64::from(pitch) * at[1] as u64 + at[0] as u64);
-                copy(self.encoder()?, frame, (from, part), to, offset, pitch);
+            // (rows of the frame, first row in the view)
+            let again = (more > 0).then_some((size.1 - 1..size.1, size.1));
+            for (part, at) in std::iter::once((0..size.1, 0)).chain(again) {
+                let offset = place.start + 4 * u64::from(pitch) * at as u64;
+                copy(self.encoder()?, frame, size.0, part, (to, offset), pitch);
             }
         }
-        let unpacking = Unpacking { is_opaque: true, is_bgra: frames[0].is_bgra() };
+        let (format, last) = (frames[0].format(), size.0 as u32 - 1);
+        let unpacking = Unpacking { is_opaque: true, format, last };
         self.transfer(state, Transfer::Up(unpacking))
     }
 

@@ -50,7 +50,7 @@ use commands::{Command, Pipelines, Recorder};
 use convergence::Convergence;
 use device::Device;
 pub use device::FaultInjection;
-pub use frame::{DeviceMap, Frame, OpenDevice, wgpu};
+pub use frame::{DeviceMap, Frame, OpenDevice, PixelFormat, wgpu};
 pub use kernel::{Bound, Kernel, MAX_LOOP_ITERATIONS};
 use recording::Recording;
 pub use shader::{Constant, Shader, binding_number};
@@ -299,7 +299,7 @@ impl Gpu {
             array(Data::Map(Map::Anchor)).write(device, &anchor_words(&anchors, pitch))?;
         }
         if narrow {
-            self.transfer(state, Transfer::Up(Unpacking::default()))?;
+            self.transfer(state, Transfer::Up(Unpacking::OF_HOST))?;
         }
         self.device.check()
     }
