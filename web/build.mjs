@@ -111,8 +111,8 @@ const sized = (file) => [file, statSync(join(site, file)).size, gzipSync(readFil
 const total = (name, rows) => [name, ...[1, 2].map((column) => rows.reduce((sum, row) => sum + row[column], 0))];
 const sizes = files(site).filter((file) => !later(file) && !/licen[cs]e/i.test(file)).map(sized).sort((a, b) => b[2] - a[2]);
 sizes.push(
-    total('the first map', sizes.filter(([file]) => !/^(cloud|mesh|service-worker)|small\.png$/.test(file))),
-    total('points in 3-D, after the first map', sizes.filter(([file]) => file.startsWith('cloud'))),
+    total('the first map', sizes.filter(([file]) => !/^(surface-view|mesh|service-worker)|small\.png$/.test(file))),
+    total('the surface in 3-D, after the first map', sizes.filter(([file]) => /^(surface-view|mesh)/.test(file))),
     total('other scenes, when opened', files(site).filter(later).map(sized)),
 );
 console.log(`${'file'.padEnd(36)}${'bytes'.padStart(11)}${'gzip -9'.padStart(11)}`);

@@ -82,7 +82,8 @@ export class Client {
         const id = ++this.last;
         return new Promise((resolve, reject) => {
             this.waiting.set(id, { name, resolve, reject });
-            this.worker.postMessage({ id, call: name, args } as Request);
+            const images = args.filter((arg): arg is never => arg instanceof ImageBitmap);
+            this.worker.postMessage({ id, call: name, args } as Request, images);
         });
     }
 

@@ -51,8 +51,8 @@ export async function cut(file: Blob, how: Cut): Promise<[Blob, Blob]> {
     }
 }
 
-/** Guesses how to split an image that probably holds both views; undefined for a single view. */
-export async function guess(file: Blob): Promise<Cut | undefined> {
+/** Guesses how to split an image or a frame that probably holds both views; undefined for a single view. */
+export async function guess(file: Blob | HTMLVideoElement): Promise<Cut | undefined> {
     const image = await createImageBitmap(file).catch(() => undefined);
     if (!image) {
         return undefined;

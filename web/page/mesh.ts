@@ -1,4 +1,4 @@
-// Exports the surface of a map as triangles. A separate chunk, loaded on first use.
+// The surface of a map as triangles, and its files. A separate chunk, loaded on first use.
 
 import type { Cameras, Picture } from './protocol';
 import { place } from './ruler';
@@ -9,13 +9,21 @@ export interface Mesh {
     /** Texture coordinates in the left view, 0 to 1. */
     texture: Float32Array<ArrayBuffer>;
     colours: Uint8Array<ArrayBuffer>;
+    /** 0 where the disparity is filled. */
+    confidences: Uint8Array<ArrayBuffer>;
+    /** Number of vertices that were measured. */
+    measured: number;
     /** Three vertices each, counter-clockwise as seen by the camera. */
     triangles: Uint32Array<ArrayBuffer>;
+    /** Vertices without a triangle, such as those of a wire. */
+    lonely: Uint32Array<ArrayBuffer>;
+    /** Every how many pixels there is a vertex, in rows and columns. */
+    step: number;
     unit: string;
 }
 
-/** The inputs of a mesh. */
-export interface Surface {
+/** The maps that a mesh is made of. */
+export interface Maps {
     width: number;
     height: number;
     disparity: Float32Array;
@@ -27,48 +35,59 @@ export interface Surface {
 /** Largest number of vertices; larger maps are subsampled. */
 const MOST = 1_000_000;
 
-/**
- * A mesh of the measured pixels of at least this confidence. Neighbours are connected if their disparities differ by at most a pixel per
- * pixel of distance, so that surfaces are closed and depth edges open.
- */
-export function mesh({ width, height, disparity, confidence, validity }: Surface, cameras: Cameras, left: Picture, least: number): Mesh {
+/** Largest difference of joined disparities, in pixels per pixel of distance. A steep floor stays whole, and depth edges stay open. */
+const STEEPEST = 2;
+
+/** A mesh of the pixels of at least this confidence: with 0, of the filled ones too. Neighbours of similar disparity are joined. */
+export function mesh({ width, height, disparity, confidence, validity }: Maps, cameras: Cameras, left: Picture, least: number): Mesh {
     const step = Math.ceil(Math.sqrt((width * height) / MOST));
     const [columns, rows] = [Math.ceil(width / step), Math.ceil(height / step)];
     const vertex = new Int32Array(columns * rows).fill(-1);
+    // Infinity without a vertex, which is too far from all others to be joined.
+    const seen = new Float32Array(columns * rows).fill(Infinity);
     const positions = new Float32Array(3 * columns * rows);
     const texture = new Float32Array(2 * columns * rows);
     const colours = new Uint8Array(3 * columns * rows);
-    const pixel = (at: number) => step * (Math.floor(at / columns) * width + (at % columns));
-    let count = 0;
+    const confidences = new Uint8Array(columns * rows);
+    let [count, measured] = [0, 0];
     for (let at = 0; at < vertex.length; at += 1) {
-        const i = pixel(at);
-        const [x, y] = [i % width, Math.floor(i / width)];
-        const there = validity[i] === 0 && (confidence[i] ?? 0) >= least;
-        const point = there ? place({ x, y }, disparity[i] ?? Infinity, cameras) : undefined;
+        const [x, y] = [step * (at % columns), step * Math.floor(at / columns)];
+        const i = y * width + x;
+        const filled = validity[i] !== 0;
+        const sure = filled ? 0 : (confidence[i] ?? 0);
+        const point = sure >= least ? place({ x, y }, disparity[i] ?? Infinity, cameras) : undefined;
         if (point) {
             positions.set(point, 3 * count);
             texture.set([(x + 0.5) / width, (y + 0.5) / height], 2 * count);
             colours.set(left.pixels.subarray(4 * i, 4 * i + 3), 3 * count);
+            confidences[count] = sure;
+            measured += filled ? 0 : 1;
+            seen[at] = disparity[i] ?? 0;
             vertex[at] = count;
             count += 1;
         }
     }
     const triangles = new Uint32Array(6 * columns * rows);
+    const joined = new Uint8Array(count);
     let length = 0;
-    const of = (at: number) => disparity[pixel(at)] ?? Infinity;
     const join = (...corners: [number, number, number]) => {
-        const seen = corners.map(of);
-        if (corners.every((at) => (vertex[at] ?? -1) >= 0) && Math.max(...seen) - Math.min(...seen) <= step) {
-            triangles.set(corners.map((at) => vertex[at] ?? 0), length);
-            length += 3;
+        const of = corners.map((at) => seen[at] ?? Infinity);
+        if (Math.max(...of) - Math.min(...of) <= STEEPEST * step) {
+            for (const at of corners) {
+                const corner = vertex[at] ?? 0;
+                triangles[length] = corner;
+                joined[corner] = 1;
+                length += 1;
+            }
         }
     };
+    const apart = (a: number, b: number) => Math.abs((seen[a] ?? Infinity) - (seen[b] ?? Infinity));
     for (let row = 0; row + 1 < rows; row += 1) {
         for (let column = 0; column + 1 < columns; column += 1) {
             const a = row * columns + column;
             const [b, c, d] = [a + 1, a + columns, a + columns + 1];
             // Splits along the flatter diagonal.
-            if (Math.abs(of(a) - of(d)) <= Math.abs(of(b) - of(c))) {
+            if (apart(a, d) <= apart(b, c)) {
                 join(a, c, d);
                 join(a, d, b);
             } else {
@@ -81,7 +100,11 @@ export function mesh({ width, height, disparity, confidence, validity }: Surface
         positions: positions.slice(0, 3 * count),
         texture: texture.slice(0, 2 * count),
         colours: colours.slice(0, 3 * count),
+        confidences: confidences.slice(0, count),
+        measured,
         triangles: triangles.slice(0, length),
+        lonely: Uint32Array.from(joined.keys()).filter((of) => joined[of] === 0),
+        step,
         unit: cameras.unit,
     };
 }

@@ -9,7 +9,6 @@ import { tooLarge } from './memory';
 import { keepOffline } from './offline';
 import { painted } from './paint';
 import { sharePicture } from './picture';
-import { PointsTab } from './points';
 import { told } from './readout';
 import { lit } from './relief';
 import type { Cameras, Colours, Comparison, Device, Facts, Known, Map, Pair, Picture, Prior, PriorUse, Range, Result, Size, Warning } from './protocol';
@@ -21,8 +20,10 @@ import { Settings } from './settings';
 import { offerCamera } from './shots';
 import { type Scene, Slots, type View as Opened } from './slots';
 import { Wiggle, aligned, anaglyph } from './stereo';
+import { SurfaceTab } from './surface';
 import { tabs } from './tabs';
 import { Turns } from './turns';
+import { VideoDialog } from './video';
 import { calm, onlyLooks } from './visitor';
 import { withoutWebGpu } from './webgpu';
 
@@ -33,10 +34,10 @@ declare const SCENES: Scene[];
 /** Settings of the first match: fast on any machine. */
 const FIRST = { device: 'cpu', preset: 'fast' } as const;
 
-/** How long the first map is shown before its points, in ms. */
+/** How long the first map is shown before its surface, in ms. */
 const LOOK = 1500;
 
-type View = Map | 'left' | 'stereo' | 'points';
+type View = Map | 'left' | 'stereo' | 'surface';
 
 /** What a pair is rectified by. */
 type Rectifier = 'calibration' | 'matches';
@@ -76,15 +77,20 @@ const slots = new Slots(
         void load(match);
     },
     (files) => client.call('whole', files),
+    (film) => video.open(film),
 );
+const video = new VideoDialog(client, () => settings.device);
 const map = new MapView((pixel) => readOut(pixel), (pixel) => ruler.pick(pixel));
-const points = new PointsTab((cameras) => client.call('points', cameras), () => {
-    readOut(undefined);
-    ruler.draw();
-});
+const surface = new SurfaceTab(
+    () => result && pair && { ...result, left: pair.left, name: stem(pair.name) },
+    () => {
+        readOut(undefined);
+        ruler.draw();
+    },
+);
 const ruler = new Ruler(
     ({ x, y }) => result?.disparity[y * result.width + x] ?? Infinity,
-    () => points.known,
+    () => surface.known,
     () => result,
 );
 const wiggle = new Wiggle();
@@ -164,7 +170,7 @@ async function start(): Promise<void> {
     if (!gpu) {
         settings.withoutGpu(withoutWebGpu());
     }
-    say('engine', gpu ? `GPU: ${device}` : 'No WebGPU: the CPU path');
+    say('engine', gpu ? `GPU: ${device}` : 'Running on your CPU');
     document.documentElement.dataset['gpu'] = gpu ? 'yes' : 'no';
     if (app.dataset['state'] === 'starting') {
         be(idle());
@@ -192,11 +198,11 @@ async function openGpu(): Promise<string | undefined> {
     }
 }
 
-/** Shows the points of the first result to a user who has not interacted yet. */
+/** Shows the surface of the first result to a user who has not interacted yet. */
 async function showDepth(): Promise<void> {
     await new Promise((resolve) => setTimeout(resolve, LOOK));
-    if (onlyLooks() && result && (await points.prepare()) && onlyLooks() && result) {
-        list.select(by('tab-points'));
+    if (onlyLooks() && result && (await surface.prepare()) && onlyLooks() && result) {
+        list.select(by('tab-surface'));
     }
 }
 
@@ -251,7 +257,7 @@ async function read(matched: boolean): Promise<void> {
 /** Reads two views, shows them, and determines the range. */
 async function take(signal: AbortSignal, left: Opened, right: Opened): Promise<Loaded> {
     const mine = (pair = { ...(await open(signal, left, right)), name: slots.name ?? left.name });
-    points.pair(mine.left.width, mine.left.height, mine.cameras, mine.files);
+    surface.pair(mine.left.width, mine.left.height, mine.cameras, mine.files);
     settings.pair(mine.size.width, mine.size.height);
     slots.show('left', mine.left);
     slots.show('right', mine.right);
@@ -275,7 +281,7 @@ function mustFit(left: Opened, right: Opened): void {
     }
     if (a && b && (a.width !== b.width || a.height !== b.height)) {
         const [one, other] = [a, b].map(({ width, height }) => `${width} × ${height}`);
-        throw new Error(`The left view has ${one} pixels and the right one ${other}. The views of a pair have one size.`);
+        throw new Error(`The left view has ${one} pixels and the right one ${other}. Both images must have the same size.`);
     }
 }
 
@@ -391,7 +397,7 @@ async function checkRange(): Promise<void> {
         say('range-problem', 'Give two whole numbers, the smaller one first.');
         return;
     }
-    say('range-problem', unfound ? 'Sparse matches find no range. Give one.' : undefined);
+    say('range-problem', unfound ? 'No depth range was found. Do both images show the same scene? If so, give a range.' : undefined);
     // A new worker has no pair before the next match.
     if (!pair || pair.generation !== client.generation) {
         return;
@@ -550,7 +556,7 @@ async function present(): Promise<void> {
     const facts = [`${width} × ${height} pixels`, ...(half ? ['at half size'] : []), `range ${min} to ${max}`, preset, `${iterations} iterations`, device, duration(took)];
     say('facts', facts.join(' · '));
     by('compare').title = gpu ? 'Matches by the other path too and counts the pixels that differ' : 'There is no GPU to compare with';
-    points.result(true);
+    surface.result(true);
     offerBefore();
     ruler.clear();
     readOut(undefined);
@@ -587,7 +593,7 @@ function forget(): void {
     offerBefore();
     ruler.clear();
     legend.none();
-    points.forget();
+    surface.forget();
     by('outcome').hidden = true;
     for (const id of ['facts', 'comparison', 'readout', 'prior-note', 'problem', 'range-found', 'range-problem', 'save-problem', 'stage']) {
         say(id, undefined);
@@ -615,7 +621,7 @@ async function showView(): Promise<void> {
     const mine = result;
     const shown = view;
     wiggle.stop();
-    if (!pair || shown === 'points') {
+    if (!pair || shown === 'surface') {
         return;
     }
     if (!mine) {
@@ -644,7 +650,7 @@ async function showView(): Promise<void> {
     if (shown === 'disparity' && facts) {
         legend.scale(facts.scales[colours()], pixels(mine.spread.min), pixels(mine.spread.max), 'px of disparity', '98 % of the measured pixels are between these');
     } else if (shown === 'confidence' && facts) {
-        legend.scale(facts.scales.grey, '0', '255', 'in 1/8 nat: how far the runner-up is behind, on average over the pixels around');
+        legend.scale(facts.scales.grey, '0', '255', 'how sure each pixel is');
     } else if (shown === 'validity' && facts) {
         legend.reasons(facts.reasons, mine.validity);
     } else {
@@ -670,13 +676,13 @@ const pixels = (value: number): string => String(Number(value.toFixed(1)));
 
 function select(to: View): void {
     view = to;
-    const inPoints = to === 'points';
-    by('map').hidden = by('map-tools').hidden = inPoints;
-    by('points').hidden = by('points-tools').hidden = !inPoints;
+    const inSurface = to === 'surface';
+    by('map').hidden = by('map-tools').hidden = inSurface;
+    by('surface').hidden = by('surface-tools').hidden = !inSurface;
     by('colours-label').hidden = by('relief-label').hidden = to !== 'disparity';
     by('stereo-label').hidden = to !== 'stereo';
-    by('map').setAttribute('aria-labelledby', `tab-${inPoints ? 'disparity' : to}`);
-    points.select(inPoints, result !== undefined);
+    by('map').setAttribute('aria-labelledby', `tab-${inSurface ? 'disparity' : to}`);
+    surface.select(inSurface, result !== undefined);
     void showView();
 }
 
@@ -687,7 +693,7 @@ function readOut(pixel: Pixel | undefined): void {
         say('readout', pair && hint);
         return;
     }
-    say('readout', told(pixel, result, facts, points.known));
+    say('readout', told(pixel, result, facts, surface.known));
 }
 
 /** Matches on the other device and compares. */
@@ -728,7 +734,7 @@ async function download(file: File | 'picture'): Promise<void> {
         if (!held() || !mine || !of) {
             throw new Error('The engine was started again since this match. Match once more to save.');
         }
-        await saveFile(client, file, stem(of.name), mine, of.left, points.cameras, points.leastConfidence);
+        await saveFile(client, file, stem(of.name), mine, of.left, surface.cameras, surface.leastConfidence);
     } catch (error) {
         if (mine === result) {
             say('save-problem', explained(error));

@@ -1,25 +1,15 @@
 // A picture of the map that is shown, with its legend, to share or to save.
 
 import { by } from './dom';
-import { save } from './save';
+import { share } from './save';
 
 /** The share of the width that a line of the legend is high, and its limits in pixels. */
 const LINE = { share: 0.05, least: 16, most: 64 };
 
-/** Shares the picture where the system can share files, as phones do, and else saves it. */
+/** Shares or saves the picture. */
 export async function sharePicture(name: string): Promise<void> {
     const blob = await drawn().convertToBlob({ type: 'image/png' });
-    const file = new File([blob], `${name}-picture.png`, { type: blob.type });
-    if (matchMedia('(pointer: coarse)').matches && navigator.canShare?.({ files: [file] })) {
-        // Closing the dialog of the system is no failure.
-        await navigator.share({ files: [file] }).catch((error) => {
-            if ((error as DOMException).name !== 'AbortError') {
-                throw error;
-            }
-        });
-        return;
-    }
-    save(new Uint8Array(await blob.arrayBuffer()), file.name, file.type);
+    await share(new File([blob], `${name}-picture.png`, { type: blob.type }));
 }
 
 /** The map as it is shown, without its divider, above the colours of its scale. */

@@ -144,12 +144,15 @@ export interface Cameras {
     unit: string;
 }
 
-export interface Cloud {
-    /** x right, y down, z forward of the left camera. */
-    positions: Float32Array<ArrayBuffer>;
-    colours: Uint8Array<ArrayBuffer>;
-    confidences: Uint8Array<ArrayBuffer>;
-    count: number;
+/** A frame of a video, matched. */
+export interface Live {
+    range: Range;
+    /** In pixels; +Infinity where missing. */
+    disparity: Float32Array<ArrayBuffer>;
+    /** The disparities in colours over the range. */
+    picture: Picture;
+    /** The left view, if it was rectified. */
+    left: Picture | undefined;
 }
 
 /** The calls of the worker, with arguments and results. */
@@ -177,8 +180,14 @@ export interface Calls {
     calibration(files: Text[], width: number, height: number): Known | undefined;
     /** Puts a rectified pair in the place of the pair: by a calibration, or without one by matches. */
     rectify(files: Text[] | undefined): Rectified;
-    points(cameras: Cameras): Cloud;
     ply(cameras: Cameras, leastConfidence: number): Uint8Array<ArrayBuffer>;
+    /** Begins a video on a device, and returns the display name of it. */
+    video(device: Device): string;
+    /** Learns from a frame how the views are rectified and which disparities there are, and returns what was done. Takes the images over. */
+    learn(left: ImageBitmap, right: ImageBitmap): string[];
+    /** Matches a frame. Takes the images over. */
+    frame(left: ImageBitmap, right: ImageBitmap): Live;
+    endVideo(): void;
 }
 
 export type Name = keyof Calls;

@@ -69,7 +69,7 @@ export class Ruler {
         }
         const cameras = this.cameras();
         if (!cameras) {
-            return 'No length: the cameras are a guess. Give them in the tab Points, or drop a calibration.';
+            return 'No length: the cameras are a guess. Give them in the tab Surface, or drop a calibration.';
         }
         const [from, to] = [a, b].map((end) => place(end, this.disparity(end), cameras));
         if (!from || !to) {

@@ -3,7 +3,7 @@
 import { make } from './dom';
 
 /** Offers bytes as a download. */
-export function save(bytes: Uint8Array<ArrayBuffer>, name: string, type: string): void {
+export function save(bytes: Uint8Array<ArrayBuffer> | Blob, name: string, type: string): void {
     const url = URL.createObjectURL(new Blob([bytes], { type }));
     const link = make('a', { href: url, download: name });
     document.body.append(link);
@@ -11,6 +11,20 @@ export function save(bytes: Uint8Array<ArrayBuffer>, name: string, type: string)
     link.remove();
     // By then the browser has read the data.
     setTimeout(() => URL.revokeObjectURL(url), 60_000);
+}
+
+/** Shares a file where the system can share files, as phones do, and else saves it. */
+export async function share(file: File): Promise<void> {
+    if (matchMedia('(pointer: coarse)').matches && navigator.canShare?.({ files: [file] })) {
+        // Closing the dialog of the system is no failure.
+        await navigator.share({ files: [file] }).catch((error) => {
+            if ((error as DOMException).name !== 'AbortError') {
+                throw error;
+            }
+        });
+        return;
+    }
+    save(file, file.name, file.type);
 }
 
 /** The prefix of saved files: the scene, or the left file without folder and extension. */

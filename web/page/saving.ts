@@ -21,7 +21,7 @@ export async function saveFile(
 ): Promise<void> {
     if (file === 'ply' || file === 'mesh' || file === 'glb') {
         if (!cameras) {
-            throw new Error('Points and meshes take the cameras, in the tab Points.');
+            throw new Error('Points and meshes need camera values. Enter them in the tab Surface.');
         }
         if (file === 'ply') {
             save(await client.call('ply', cameras, leastConfidence), `${name}-points.ply`, BINARY);

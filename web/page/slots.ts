@@ -67,6 +67,7 @@ function cutting(parts: Halves | [Blob, Blob]): string {
     return parts.how === 'beside' ? 'Cut into its left and right half.' : 'Cut into its upper half, as the left view, and its lower half.';
 }
 
+const isFilm = ({ file, name }: Named): boolean => file.type.startsWith('video/') || /\.(mp4|m4v|mov|webm|mkv|avi)$/i.test(name);
 const other = (side: Side): Side => (side === 'left' ? 'right' : 'left');
 const listed = (files: { name: string }[]): string => files.map(({ name }) => name).join(', ');
 const untimely = ({ name }: Named): string => `Give ${name} once both views are there: it is of the left one.`;
@@ -97,11 +98,13 @@ export class Slots {
     /** The scene being fetched. */
     private readonly fetches = new Turns();
 
-    /** `changed` is called after every change of a view or of the calibration; `isWhole` says whether files are all of a calibration. */
+    /** `changed` is called after every change of a view or of the calibration; `isWhole` says whether files are all of a calibration; `film` takes
+     * films. */
     constructor(
         scenes: Scene[],
         private readonly changed: (wish: Wish) => void,
         private readonly isWhole: (files: Text[]) => Promise<boolean>,
+        private readonly film: (film: Named) => void,
     ) {
         for (const side of SIDES) {
             const input = by<HTMLInputElement>(`${side}-file`);
@@ -150,6 +153,11 @@ export class Slots {
     /** Takes files, or reports why not and changes nothing. */
     private async add(all: Named[], given: Source): Promise<void> {
         this.quiet();
+        const film = all.find(isFilm);
+        if (film) {
+            this.film(film);
+            return;
+        }
         const { prior, others: files } = await apart(all, given.name !== undefined, this.missing === undefined);
         if (prior && files.length === 0) {
             this.know(prior);

@@ -2,6 +2,7 @@
 
 import init, * as engine from 'engine';
 import { broken, buffers, own, words } from './answers';
+import { painted } from './paint';
 import type { Calls, Cameras, Device, Name, Pair, Picture, Prior, PriorUse, Range, Reply, Request, Size, Text, Warning } from './protocol';
 import { spread } from './spread';
 
@@ -34,6 +35,31 @@ async function named(device: string): Promise<string> {
     const info = (await gpu.requestAdapter())?.info;
     const known = [info?.['vendor'], info?.['architecture']].filter(Boolean);
     return known.length > 0 ? `${known.join(' ')} (${UNNAMED})` : UNNAMED;
+}
+
+/** The colours of the frames of a video. */
+let turbo: Uint8Array | undefined;
+let video: engine.Video | undefined;
+/** Resolves when no frame is being matched. */
+let frames: Promise<unknown> = Promise.resolve();
+
+/** Uses the video once it is free. */
+function filmed<R>(use: (video: engine.Video) => R | Promise<R>): Promise<R> {
+    const next = frames.then(() => use(need(video, 'video')));
+    frames = next.catch(() => {});
+    return next;
+}
+
+/** The pixels of an image, which is freed. */
+function pixels(image: ImageBitmap): Uint8Array {
+    const { width, height } = image;
+    const context = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });
+    if (!context) {
+        throw new Error(`The browser cannot hold a picture of ${width} × ${height} pixels.`);
+    }
+    context.drawImage(image, 0, 0);
+    image.close();
+    return new Uint8Array(context.getImageData(0, 0, width, height).data.buffer);
 }
 
 function need<T>(value: T | undefined, what: string): T {
@@ -70,6 +96,16 @@ function told(of: engine.Cameras | undefined): Cameras | undefined {
     const { focal_length, cx, cy, doffs, baseline, unit } = of;
     of.free();
     return { focalLength: focal_length, cx, cy, doffs, baseline, unit };
+}
+
+/** Converts a range of the engine, and frees it. */
+function seen(found: engine.Range | undefined): Range | undefined {
+    if (!found) {
+        return undefined;
+    }
+    const { min, max } = found;
+    found.free();
+    return { min, max };
 }
 
 const known = (files: Text[]) => new engine.Known(files.map(({ name }) => name), files.map(({ text }) => text));
@@ -119,6 +155,7 @@ const bytes = async (file: Blob) => new Uint8Array(await file.arrayBuffer());
 const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[N]> | Promise<ReturnType<Calls[N]>> } = {
     async start() {
         await init({ module_or_path: new URL(ENGINE, self.location.href) });
+        turbo = engine.scale('turbo');
         const scales = { turbo: engine.scale('turbo'), viridis: engine.scale('viridis'), grey: engine.scale('grey') };
         return { version: engine.version(), presets: engine.presets(), reasons: engine.reasons(), scales };
     },
@@ -169,13 +206,7 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
         return need(pair, 'pair').knowFile(await bytes(file), name) as Prior;
     },
     range() {
-        const found = need(pair, 'pair').range();
-        if (found === undefined) {
-            return undefined;
-        }
-        const { min, max } = found;
-        found.free();
-        return { min, max };
+        return seen(need(pair, 'pair').range());
     },
     warnings(range) {
         // This call consumes the range.
@@ -188,15 +219,15 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
         matched?.free();
         const { width, height, min, max, iterations, note, corrected, tiles } = found;
         const [disparity, validity] = [own(found.disparity()), own(found.validity())];
-        const seen = spread(disparity, validity, { min, max });
-        [matched, made] = [found, { preset, range, found: wide, half, spread: seen }];
+        const shown = spread(disparity, validity, { min, max });
+        [matched, made] = [found, { preset, range, found: wide, half, spread: shown }];
         return {
             ...{ width, height, range: { min, max }, iterations, device: await named(found.device), note, took, corrected, tiles, half, short },
-            ...{ disparity, validity, spread: seen },
+            ...{ disparity, validity, spread: shown },
             warnings: found.warnings() as Warning[],
             prior: found.prior() as PriorUse | undefined,
             confidence: own(found.confidence()),
-            picture: picture(width, height, found.picture('disparity', colours, seen.min, seen.max)),
+            picture: picture(width, height, found.picture('disparity', colours, shown.min, shown.max)),
         };
     },
     async compare(device) {
@@ -225,16 +256,38 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
                 return own(maps.png(output));
         }
     },
-    points(of) {
-        return using(cameras(of), (rig) => {
-            const points = need(matched, 'map').points(rig, need(pair, 'pair'));
-            const { positions, colours, confidences, count } = points;
-            points.free();
-            return { positions: own(positions), colours: own(colours), confidences: own(confidences), count };
-        });
-    },
     ply(of, leastConfidence) {
         return using(cameras(of), (rig) => own(need(matched, 'map').ply(rig, need(pair, 'pair'), leastConfidence)));
+    },
+    async video(device) {
+        await calls.endVideo();
+        video = await engine.Video.open(device);
+        return named(video.device);
+    },
+    learn(left, right) {
+        const { width, height } = left;
+        return filmed((of) => of.learn(pixels(left), pixels(right), width, height));
+    },
+    frame(left, right) {
+        return filmed(async (of) => {
+            const { width, height } = left;
+            const match = of.direct ? of.images(left, right) : of.pixels(pixels(left), pixels(right), width, height);
+            return using(await match, (map) => {
+                const range = need(seen(of.range), 'range');
+                const disparity = own(map.disparity());
+                const rectified = map.left();
+                return {
+                    ...{ range, disparity },
+                    picture: painted(map.width, map.height, disparity, need(turbo, 'scale'), range),
+                    left: rectified && picture(map.width, map.height, rectified),
+                };
+            });
+        });
+    },
+    async endVideo() {
+        await frames;
+        video?.free();
+        video = undefined;
     },
 };
 

@@ -10,6 +10,7 @@ mod pair;
 mod prior;
 mod rectified;
 mod tables;
+mod video;
 mod words;
 
 use wasm_bindgen::prelude::wasm_bindgen;

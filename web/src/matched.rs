@@ -8,7 +8,7 @@ use crate::words::{error, thrown, warning};
 use js_sys::Array;
 use mrfgs::check::Warning;
 use mrfgs::colour::{self, ColourMap};
-use mrfgs::image::cloud::{Cloud, Point};
+use mrfgs::image::cloud::Cloud;
 use mrfgs::image::picture::Picture;
 use mrfgs::image::ply;
 use mrfgs::image::write::Writer;
@@ -161,12 +161,6 @@ impl Matched {
         .map_err(thrown)
     }
 
-    /// The points that were measured and are reliable, with the colours of `pair`.
-    #[must_use]
-    pub fn points(&self, cameras: &Cameras, pair: &StereoPair) -> Points {
-        Points { points: self.cloud(cameras, pair).points }
-    }
-
     /// The points of at least this confidence as a PLY file.
     #[must_use]
     pub fn ply(&self, cameras: &Cameras, pair: &StereoPair, least_confidence: u8) -> Vec<u8> {
@@ -203,39 +197,6 @@ impl Matched {
 
     fn cloud(&self, cameras: &Cameras, pair: &StereoPair) -> Cloud {
         cameras.rig.cloud(&self.matched.maps, pair.pair.left())
-    }
-}
-
-/// A point cloud in the frame of the left camera: x right, y down, z forward.
-#[wasm_bindgen]
-pub struct Points {
-    points: Vec<Point>,
-}
-
-#[wasm_bindgen]
-impl Points {
-    /// Number of points.
-    #[wasm_bindgen(getter)]
-    pub fn count(&self) -> usize {
-        self.points.len()
-    }
-
-    /// x, y and z of each point.
-    #[wasm_bindgen(getter)]
-    pub fn positions(&self) -> Vec<f32> {
-        self.points.iter().flat_map(|point| point.position).collect()
-    }
-
-    /// Red, green and blue of each point.
-    #[wasm_bindgen(getter)]
-    pub fn colours(&self) -> Vec<u8> {
-        self.points.iter().flat_map(|point| point.colour).collect()
-    }
-
-    /// Confidence of each point.
-    #[wasm_bindgen(getter)]
-    pub fn confidences(&self) -> Vec<u8> {
-        self.points.iter().map(|point| point.confidence).collect()
     }
 }
 

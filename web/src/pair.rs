@@ -126,13 +126,20 @@ impl StereoPair {
 }
 
 fn of_samples<S: Sample>(left: (&[S], (usize, usize)), right: (&[S], (usize, usize))) -> Thrown<StereoPair> {
+    Ok(StereoPair::of(pair_of_samples(left, right).map_err(thrown)?, None))
+}
+
+/// A pair of two views, each with its samples and its (width, height).
+pub(crate) fn pair_of_samples<S: Sample>(
+    left: (&[S], (usize, usize)),
+    right: (&[S], (usize, usize)),
+) -> mrfgs::Result<Pair> {
     fn view<S: Sample>((samples, (width, height)): (&[S], (usize, usize))) -> mrfgs::Result<Raster<'_>> {
         let pixels = width.saturating_mul(height);
         let channels = samples.len().checked_div(pixels).unwrap_or(0);
         Raster::new(width, height, channels, S::samples(Cow::Borrowed(samples)))
     }
-    let pair = view(left).and_then(|left| Pair::of_frames(left, view(right)?));
-    Ok(StereoPair::of(pair.map_err(thrown)?, None))
+    Pair::of_frames(view(left)?, view(right)?)
 }
 
 /// Disparities to search, in pixels, inclusive.

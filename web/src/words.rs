@@ -16,7 +16,7 @@ const PAGE: Vocabulary = Vocabulary {
     range: Some("disparity range"),
     cpu: "use the program in place of the browser",
     driver: ["use one with WebGPU", "update its driver or the browser"],
-    unit: Some("choose the right one in the tab Points"),
+    unit: Some("choose the right one in the tab Surface"),
     ..Vocabulary::PLAIN
 };
 
@@ -62,12 +62,17 @@ pub(crate) fn doubt(doubt: &Doubt) -> String {
     remedy::doubt(doubt, WORDS.get())
 }
 
+/// The text of a warning about a pair that is not rectified here, with its remedy.
+pub(crate) fn text(warning: &Warning) -> String {
+    remedy::warning(warning, WORDS.get())
+}
+
 /// A warning about a pair or its maps as `{ text, remedy }`. The text includes a remedy; `remedy` is "swap", "rectify" or "widen" if the
 /// page can apply it, or undefined.
 pub(crate) fn warning(warning: &Warning, by: Option<&By>) -> JsValue {
     let text = match by {
         Some(by) => remedy::of_rectified(warning, matches!(by, By::Calibration), WORDS.get()),
-        None => remedy::warning(warning, WORDS.get()),
+        None => text(warning),
     };
     let remedy = match warning {
         Warning::Swapped { .. } => Some("swap"),

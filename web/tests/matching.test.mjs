@@ -70,7 +70,8 @@ describe('a match', () => {
             };
         });
         // On a software driver this takes a little longer than the page waits: the driver finishes its queue, and draws no page meanwhile.
-        await visit.set({ device: 'gpu', preset: 'paper', range: [0, 15] });
+        // Firefox has a faster one.
+        await visit.set({ device: 'gpu', preset: 'paper', range: [0, BROWSER === 'firefox' ? 63 : 15] });
         await visit.begin();
         await visit.tab.click('#cancel');
         // The last map is kept.
@@ -165,9 +166,9 @@ describe('without a network', () => {
         await visit.set({ device: 'cpu' });
         assert.equal(await visit.scene('thin'), 'done');
         assert.equal(difference((await visit.save('pfm')).bytes, native(...views('thin')).pfm), undefined);
-        await visit.tab.click('#tab-points');
+        await visit.tab.click('#tab-surface');
         // The chunk is available, and reports a missing WebGL itself.
-        await visit.says('#cloud-note', /[\d,]+ points|no WebGL 2/);
+        await visit.says('#surface-note', /[\d,]+ points|no WebGL 2/);
         await visit.tab.click('[data-scene=steep]');
         await visit.says('#pair-problem', /could not be loaded/);
         // The browser reports the scene that it could not fetch.

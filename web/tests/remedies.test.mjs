@@ -110,7 +110,7 @@ describe('remedies', () => {
         assert.equal(await visit.changed(() => click('#notes', 'Undo rectification')), 'ready');
         assert.doesNotMatch(await visit.text('#notes'), /Rectified/);
         await visit.says('#warnings', /not rectified/);
-        await visit.says('#range-problem', /^Sparse matches find no range/);
+        await visit.says('#range-problem', /^No depth range was found/);
         // Match leads to the button.
         await visit.tab.click('#match');
         await visit.tab.waitForFunction(() => document.activeElement.id === 'rectify');
@@ -146,13 +146,13 @@ describe('remedies', () => {
         const [one, other] = [views('thin')[0], views('steep')[1]];
         assert.equal(await visit.changed(() => visit.give('dropped', [one, other].map((path, i) => ({ name: `im${i}.png`, path })))), 'ready');
         await visit.says('#pair-problem', /cannot be rectified without a calibration/);
-        await visit.says('#range-problem', /^Sparse matches find no range/);
+        await visit.says('#range-problem', /^No depth range was found/);
         assert.equal(await visit.tab.$eval('#no-range', (offer) => offer.checkVisibility()), false);
         await visit.match({ range: [0, 31] });
         const offered = () => visit.tab.$$eval('#warnings button, #notes button', (buttons) => buttons.map((button) => button.textContent));
         assert.ok(!(await offered()).includes('Rectify'), await visit.text('#warnings'));
         await visit.set({ range: 'automatic' });
-        await visit.says('#range-problem', /find no range/);
+        await visit.says('#range-problem', /No depth range was found/);
         assert.equal(await visit.tab.$eval('#no-range', (offer) => offer.checkVisibility()), false);
         // The failure concerned that pair.
         assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'done');

@@ -105,36 +105,41 @@ describe('views', () => {
         assert.equal(Number(await visit.text('#scale-max')), Number(end(0.99).toFixed(1)));
     });
 
-    it('turns the points, and hides those of less confidence', async (test) => {
-        await visit.tab.click('#tab-points');
+    it('turns the surface, films it, and hides what is filled and of less confidence', async (test) => {
+        await visit.tab.click('#tab-surface');
         if (!(await visit.tab.evaluate(() => Boolean(document.createElement('canvas').getContext('webgl2'))))) {
-            await visit.says('#cloud-note', /cannot be shown: this browser offers no WebGL 2/);
-            console.error('SKIPPED points in 3-D: this browser has no WebGL without a display');
+            await visit.says('#surface-note', /cannot be shown: this browser offers no WebGL 2/);
+            console.error('SKIPPED the surface in 3-D: this browser has no WebGL without a display');
             test.skip('no WebGL');
             await visit.tab.click('#tab-disparity');
             return;
         }
-        await visit.tab.waitForFunction(() => Number(document.getElementById('points').dataset.points) > 0);
-        const points = () => visit.tab.$eval('#points', (panel) => Number(panel.dataset.points));
-        const count = Number(expected.points.toString('latin1', 0, 400).match(/element vertex (\d+)/)[1]);
+        await visit.tab.waitForFunction(() => Number(document.getElementById('surface').dataset.points) > 0);
+        const points = () => visit.tab.$eval('#surface', (panel) => Number(panel.dataset.points));
+        const map = disparities(expected.pfm);
+        const pixels = Array.from({ length: 320 * 240 }, (_, i) => Number.isFinite(map.at(i % 320, Math.floor(i / 320))));
+        const [reasons, confidences] = [levels(expected.validity).levels, levels(expected.confidence).levels];
+        const count = pixels.filter(Boolean).length;
         assert.equal(await points(), count);
+        const filled = pixels.filter((there, i) => there && reasons[i] !== 0).length;
+        assert.equal((await visit.text('#surface-note')).replaceAll(',', ''), `${count} points. ${filled} are filled; a least confidence of 1 hides them.`);
         const picture = async () => {
             // Without the focus ring. Requested changes are drawn in the next frame.
             await visit.tab.evaluate(() => {
                 document.activeElement.blur();
                 return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
             });
-            return Buffer.from(await (await visit.tab.$('#cloud')).screenshot());
+            return Buffer.from(await (await visit.tab.$('#surface-canvas')).screenshot());
         };
         const before = await picture();
-        await visit.tab.focus('#cloud');
+        await visit.tab.focus('#surface-canvas');
         await visit.tab.keyboard.press('ArrowLeft');
         const turned = await picture();
         assert.ok(!before.equals(turned));
-        await visit.tab.focus('#cloud');
+        await visit.tab.focus('#surface-canvas');
         await visit.tab.keyboard.press('Home');
         assert.ok(before.equals(await picture()));
-        const box = await (await visit.tab.$('#cloud')).boundingBox();
+        const box = await (await visit.tab.$('#surface-canvas')).boundingBox();
         await visit.tab.mouse.move(box.x + 200, box.y + 200);
         await visit.tab.mouse.down();
         await visit.tab.mouse.move(box.x + 260, box.y + 220, { steps: 3 });
@@ -142,7 +147,13 @@ describe('views', () => {
         assert.ok(!before.equals(await picture()));
         await visit.tab.click('#reset-view');
         assert.ok(before.equals(await picture()));
+        const film = await visit.download(() => visit.tab.click('#film'));
+        assert.match(film.name, /^im0-film\.(mp4|webm)$/);
+        assert.ok((await visit.length(film.bytes)) > 4);
+        assert.ok(before.equals(await picture()));
         await visit.tab.focus('#least');
+        await visit.tab.keyboard.press('ArrowRight');
+        assert.equal(await points(), pixels.filter((there, i) => there && reasons[i] === 0 && confidences[i] >= 1).length);
         await visit.tab.keyboard.press('End');
         const sure = await points();
         assert.ok(sure < count / 2, `${sure} of ${count}`);
@@ -155,7 +166,7 @@ describe('views', () => {
     });
 
     it('takes other cameras', async () => {
-        await visit.tab.click('#tab-points');
+        await visit.tab.click('#tab-surface');
         const baseline = await visit.tab.$eval('#baseline', (input) => input.value);
         const set = (value) => visit.tab.$eval('#baseline', (input, value) => {
             input.value = value;
@@ -190,7 +201,7 @@ describe('views', () => {
             }
             await visit.tab.keyboard.press('Tab');
         }
-        assert.deepEqual(order, ['left-file', 'swap', 'right-file', 'add-prior', 'open-camera', 'mixed', 'slanted', 'thin', 'steep', 'preset', 'size', 'range', 'device', 'match']);
+        assert.deepEqual(order, ['left-file', 'swap', 'right-file', 'add-prior', 'open-camera', 'open-video', 'mixed', 'slanted', 'thin', 'steep', 'preset', 'size', 'range', 'device', 'match']);
         await visit.tab.focus('[data-scene=slanted]');
         await visit.changed(() => visit.tab.keyboard.press('Enter'));
         await visit.state('done');
@@ -329,13 +340,16 @@ describe('views', () => {
             const found = await other.evaluate(async () => (await window.axe.run()).violations.map(({ id, nodes }) => [id, nodes.map(({ target }) => target.join(' '))]));
             assert.deepEqual(found, [], scheme);
         }
+        await other.click('#open-video');
+        const found = await other.evaluate(async () => (await window.axe.run()).violations.map(({ id }) => id));
+        assert.deepEqual(found, [], 'video');
         await other.close();
         await visit.tab.bringToFront();
     });
 
     it('fits on a phone', async () => {
         await visit.tab.setViewport({ width: 360, height: 740 });
-        for (const view of [...VIEWS, 'stereo', 'points']) {
+        for (const view of [...VIEWS, 'stereo', 'surface']) {
             await visit.tab.click(`#tab-${view}`);
             const wide = await visit.tab.evaluate(() => document.documentElement.scrollWidth);
             assert.ok(wide <= 360, `${view}: ${wide}`);

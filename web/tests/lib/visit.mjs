@@ -261,12 +261,30 @@ export class Visit {
         assert.equal(await this.state('done', 'ready'), 'done', await this.text('#problem'));
     }
 
+    /** The length of a film in seconds. */
+    length(film) {
+        return this.tab.evaluate(async (base64) => {
+            const url = URL.createObjectURL(new Blob([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))]));
+            const video = Object.assign(document.createElement('video'), { muted: true, src: url });
+            await new Promise((resolve, reject) => ([video.onloadeddata, video.onerror] = [resolve, () => reject(new Error(video.error.message))]));
+            // The length of a recording is known once its end has been sought.
+            video.currentTime = 1e9;
+            await new Promise((resolve) => (video.onseeked = resolve));
+            return video.currentTime;
+        }, film.toString('base64'));
+    }
+
     /** Clicks a download, waits for the file, and returns its name and bytes. */
-    async save(output) {
+    save(output) {
+        return this.download(() => this.tab.click(`#downloads [data-output=${output}]`));
+    }
+
+    /** The next file that is downloaded after an action. */
+    async download(act) {
         for (const file of readdirSync(this.downloads)) {
             rmSync(join(this.downloads, file));
         }
-        await this.tab.click(`#downloads [data-output=${output}]`);
+        await act();
         for (;;) {
             const [name] = readdirSync(this.downloads).filter((file) => !/\.(part|crdownload|tmp)$|^\./.test(file));
             // Firefox first creates an empty file, then fills another.

@@ -1,8 +1,11 @@
-// The 3-D view of the points, in a separate chunk with three.js that is loaded on first use.
+// The 3-D view of the surface of a map, in a separate chunk with three.js that is loaded on first use.
 
 import {
     BufferAttribute,
     BufferGeometry,
+    DoubleSide,
+    Group,
+    Mesh,
     PerspectiveCamera,
     Points,
     Scene,
@@ -13,37 +16,45 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { step } from './dom';
-import type { Cameras, Cloud } from './protocol';
+import { Recording } from './film';
+import type { Mesh as Surface } from './mesh';
+import type { Cameras } from './protocol';
 import { calm } from './visitor';
 
-// Points have the size of their pixel at their depth, so that surfaces seen from the front have no holes.
+// Lonely vertices are drawn as points of the size of their pixel at their depth.
 const VERTEX = `
     attribute float confidence;
     uniform float least, footprint, projection;
     varying vec3 tint;
+    varying float kept;
     void main() {
         tint = color;
+        kept = confidence < least ? 0.0 : 1.0;
         vec4 seen = modelViewMatrix * vec4(position, 1.0);
         gl_Position = projectionMatrix * seen;
         gl_PointSize = clamp(footprint * position.z * projection / -seen.z, 1.0, 64.0);
-        if (confidence < least) {
-            gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
-        }
     }`;
+// A triangle is dropped with any of its corners.
 const FRAGMENT = `
     varying vec3 tint;
+    varying float kept;
     void main() {
+        if (kept < 0.999) {
+            discard;
+        }
         gl_FragColor = vec4(tint, 1.0);
     }`;
 
 /** Rotation per arrow key in degrees. */
 const TURN = 5;
-/** How long new points swing, how many times, and how far to each side. */
+/** How long a new surface swings, how many times, and how far to each side. */
 const SWING = { milliseconds: 16_000, times: 2, radians: 0.24 };
+/** How long a film lasts, and how many times the surface swings in it, so that it can be played again and again. */
+const FILM = { milliseconds: 6000, times: 1 };
 /** After this many frames slower than this, the swinging stops, so that the page remains responsive. */
 const SLOW = { milliseconds: 100, frames: 30 };
 
-export class CloudView {
+export class SurfaceView {
     private readonly renderer: WebGLRenderer;
     private readonly scene = new Scene();
     private readonly camera = new PerspectiveCamera();
@@ -52,15 +63,17 @@ export class CloudView {
         vertexShader: VERTEX,
         fragmentShader: FRAGMENT,
         vertexColors: true,
+        side: DoubleSide,
         uniforms: { least: { value: 0 }, footprint: { value: 0 }, projection: { value: 0 } },
     });
-    private points: Points | undefined;
+    private shown: Group | undefined;
+    private positions: BufferAttribute | undefined;
     private rig: { cameras: Cameras; width: number; height: number } | undefined;
     private due = 0;
-    /** Whether the points may swing: until the user first moves them. */
+    /** Whether the surface may swing: until the user first moves it. */
     private swings = !calm();
 
-    /** `swinging` is called when the points start and stop swinging. Throws if the browser has no WebGL. */
+    /** `swinging` is called when the surface starts and stops swinging. Throws if the browser has no WebGL. */
     constructor(
         private readonly canvas: HTMLCanvasElement,
         private readonly swinging: (swings: boolean) => void,
@@ -78,50 +91,82 @@ export class CloudView {
         new ResizeObserver(() => this.resize()).observe(canvas);
     }
 
-    /** Shows other points. The view is kept if size and cameras are the same. */
-    show(cloud: Cloud, cameras: Cameras, width: number, height: number): void {
+    /** Shows another surface. The view is kept if size and cameras are the same. */
+    show(surface: Surface, cameras: Cameras, width: number, height: number): void {
         this.clear();
-        const geometry = new BufferGeometry();
-        geometry.setAttribute('position', new BufferAttribute(cloud.positions, 3));
-        geometry.setAttribute('color', new BufferAttribute(cloud.colours, 3, true));
-        geometry.setAttribute('confidence', new BufferAttribute(cloud.confidences, 1));
-        this.points = new Points(geometry, this.material);
-        // The camera moves inside the cloud, so culling it as a whole is pointless.
-        this.points.frustumCulled = false;
+        this.positions = new BufferAttribute(surface.positions, 3);
+        const attributes = {
+            position: this.positions,
+            color: new BufferAttribute(surface.colours, 3, true),
+            confidence: new BufferAttribute(surface.confidences, 1),
+        };
+        const [faces, lonely] = [surface.triangles, surface.lonely].map((index) => {
+            const geometry = new BufferGeometry().setIndex(new BufferAttribute(index, 1));
+            Object.entries(attributes).forEach(([name, attribute]) => geometry.setAttribute(name, attribute));
+            return geometry;
+        });
+        this.shown = new Group();
+        for (const part of [new Mesh(faces, this.material), new Points(lonely, this.material)]) {
+            // The camera moves inside the surface, so culling it as a whole is pointless.
+            part.frustumCulled = false;
+            this.shown.add(part);
+        }
         // Converts x right, y down, z forward to y up and z towards the viewer.
-        this.points.rotation.x = Math.PI;
-        this.scene.add(this.points);
+        this.shown.rotation.x = Math.PI;
+        this.scene.add(this.shown);
         this.rig = { cameras, width, height };
-        this.uniform('footprint', 1.2 / cameras.focalLength);
+        this.uniform('footprint', (1.2 * surface.step) / cameras.focalLength);
         this.reset();
         if (this.swings) {
-            this.swing(performance.now());
+            void this.swing();
         }
     }
 
-    /** Swings the points slowly from side to side to show their depth, until the user moves them or switches to another view. */
-    private swing(begun: number): void {
-        const points = this.points;
-        const start = new Spherical().setFromVector3(this.camera.position.clone().sub(this.controls.target));
+    /** Swings the surface slowly from side to side to show its depth, until the user moves it or switches to another view. */
+    private async swing(): Promise<void> {
+        let [last, slow] = [performance.now(), 0];
         this.swinging(true);
-        let [last, slow] = [begun, 0];
-        const frame = (now: number) => {
-            const part = (now - begun) / SWING.milliseconds;
+        await this.sway(SWING.milliseconds, SWING.times, (now) => {
             slow += now - last > SLOW.milliseconds ? 1 : 0;
             last = now;
-            this.swings &&= part < 1 && slow < SLOW.frames;
-            if (points !== this.points) {
-                return;
-            }
-            if (!this.swings || this.canvas.clientWidth === 0) {
-                this.swinging(false);
-                return;
-            }
-            const theta = start.theta + SWING.radians * Math.sin(2 * Math.PI * SWING.times * Math.max(0, part));
-            this.look(new Spherical(start.radius, start.phi, theta));
+            return this.swings && slow < SLOW.frames && this.canvas.clientWidth > 0;
+        });
+        this.swings = false;
+        this.swinging(false);
+    }
+
+    /** Films one swing from the current view, named `name`. Ends with an error if `signal` is aborted. */
+    async film(name: string, signal: AbortSignal): Promise<File> {
+        this.hold();
+        const recording = new Recording(this.canvas);
+        await this.sway(FILM.milliseconds, FILM.times, () => !signal.aborted && this.canvas.clientWidth > 0);
+        const file = await recording.stop(name);
+        signal.throwIfAborted();
+        return file;
+    }
+
+    /** Moves the view to both sides and back, while `goesOn`. Ends early if another surface is shown. */
+    private sway(milliseconds: number, times: number, goesOn: (now: number) => boolean): Promise<void> {
+        const shown = this.shown;
+        const begun = performance.now();
+        const start = new Spherical().setFromVector3(this.camera.position.clone().sub(this.controls.target));
+        return new Promise((resolve) => {
+            const frame = (now: number) => {
+                const part = Math.max(0, now - begun) / milliseconds;
+                if (shown !== this.shown || !goesOn(now)) {
+                    resolve();
+                    return;
+                }
+                const theta = start.theta + SWING.radians * Math.sin(2 * Math.PI * times * Math.min(1, part));
+                this.look(new Spherical(start.radius, start.phi, theta));
+                if (part >= 1) {
+                    resolve();
+                    return;
+                }
+                requestAnimationFrame(frame);
+            };
             requestAnimationFrame(frame);
-        };
-        requestAnimationFrame(frame);
+        });
     }
 
     /** Stops the swinging for good. */
@@ -136,18 +181,18 @@ export class CloudView {
         this.ask();
     }
 
-    /** Frees the memory of the points. */
+    /** Frees the memory of the surface. */
     clear(): void {
-        if (this.points) {
-            this.scene.remove(this.points);
-            this.points.geometry.dispose();
-            this.points = undefined;
+        if (this.shown) {
+            this.scene.remove(this.shown);
+            this.shown.children.forEach((part) => (part as Mesh).geometry.dispose());
+            this.shown = this.positions = undefined;
             this.renderer.renderLists.dispose();
             this.ask();
         }
     }
 
-    /** Hides points below this confidence. */
+    /** Hides what is below this confidence. */
     atLeast(confidence: number): void {
         this.uniform('least', confidence);
         this.ask();
@@ -161,11 +206,11 @@ export class CloudView {
 
     /** The view of the left camera, slightly from the side. */
     private reset(): void {
-        if (!this.points || !this.rig) {
+        if (!this.positions || !this.rig) {
             return;
         }
         const { cameras, width, height } = this.rig;
-        const [, median, far] = depths(this.points.geometry.getAttribute('position') as BufferAttribute);
+        const [, median, far] = depths(this.positions);
         const across = (pixel: number, centre: number) => ((pixel - centre) * median) / cameras.focalLength;
         this.controls.target.set(across((width - 1) / 2, cameras.cx), -across((height - 1) / 2, cameras.cy), -median);
         [this.camera.near, this.camera.far] = [median / 500, 20 * far];

@@ -1,8 +1,11 @@
-// The points tab: its cameras, and the filter by confidence.
+// The surface tab: its cameras, and the filter by confidence.
 
-import type { CloudView } from './cloud';
 import { by, count, say, words } from './dom';
-import type { Cameras, Cloud } from './protocol';
+import { canRecord } from './film';
+import type { Maps } from './mesh';
+import type { Cameras, Picture } from './protocol';
+import { share } from './save';
+import type { SurfaceView } from './surface-view';
 import { Turns } from './turns';
 
 const FIELDS = { focalLength: 'focal-length', cx: 'cx', cy: 'cy', doffs: 'doffs', baseline: 'baseline' } as const;
@@ -18,23 +21,33 @@ const NOTES: Record<Exclude<Source, 'calibration'>, string> = {
     guess: 'A guess, so not to scale: the focal length is the width of the image, the baseline is 1. Give your own, or drop a calibration.',
 };
 
-export class PointsTab {
-    private view: CloudView | undefined;
+/** What the surface is made of, and the prefix of its files. */
+interface Shown extends Maps {
+    left: Picture;
+    name: string;
+}
+
+export class SurfaceTab {
+    private view: SurfaceView | undefined;
     private source: Source = 'guess';
     /** File names of the calibration. */
     private files = '';
     private size = { width: 0, height: 0 };
-    /** Whether the shown points belong to this result and these cameras. */
+    /** Whether the surface shown is of this result and these cameras. */
     private fresh = false;
-    /** Number of points with at least this confidence. */
+    /** Number of points with at least this confidence, every how many pixels there is one, and how many were measured. */
     private atLeast = new Uint32Array(257);
+    private step = 1;
+    private measured = 0;
     private open = false;
-    /** The pending request for points. */
+    /** The surface that is being made. */
     private readonly turns = new Turns();
+    /** The film that is being made. */
+    private readonly films = new Turns();
 
-    /** `points` calls the engine; `changed` is called when the cameras change. */
+    /** `maps` are those of the result; `changed` is called when the cameras change. */
     constructor(
-        private readonly points: (cameras: Cameras) => Promise<Cloud>,
+        private readonly maps: () => Shown | undefined,
         private readonly changed: () => void,
     ) {
         for (const key of ALL) {
@@ -46,6 +59,8 @@ export class PointsTab {
         by('unit').addEventListener('change', () => this.renew());
         by('least').addEventListener('input', () => this.filter());
         by('reset-view').addEventListener('click', () => this.view?.rest());
+        by('film').hidden = !canRecord();
+        by('film').addEventListener('click', () => void this.film());
     }
 
     /** The cameras of the form; undefined if a number is missing or invalid. */
@@ -97,13 +112,13 @@ export class PointsTab {
         }
     }
 
-    /** Called when there is a result or none any more; drops earlier points. */
+    /** Called when there is a result or none any more; drops the earlier surface. */
     result(there: boolean): void {
         this.turns.next();
         this.view?.clear();
         this.fresh = false;
-        by('points').dataset['points'] = '';
-        say('cloud-note', there ? undefined : 'The points of the next result appear here.');
+        by('surface').dataset['points'] = '';
+        say('surface-note', there ? undefined : 'The surface of the next result appears here.');
         if (there && this.open) {
             void this.show();
         }
@@ -115,11 +130,11 @@ export class PointsTab {
         if (open && there && !this.fresh) {
             void this.show();
         } else if (open && !there) {
-            say('cloud-note', 'The points of the next result appear here.');
+            say('surface-note', 'The surface of the next result appears here.');
         }
     }
 
-    /** Loads the viewer, so that points appear at once. Returns whether there are points to show. */
+    /** Loads the viewer, so that the surface appears at once. Returns whether there is one to show. */
     async prepare(): Promise<boolean> {
         try {
             await this.viewer();
@@ -129,9 +144,9 @@ export class PointsTab {
         }
     }
 
-    private async viewer(): Promise<CloudView> {
-        const { CloudView } = await import('./cloud');
-        this.view ??= new CloudView(by<HTMLCanvasElement>('cloud'), (swings) => {
+    private async viewer(): Promise<SurfaceView> {
+        const { SurfaceView } = await import('./surface-view');
+        this.view ??= new SurfaceView(by<HTMLCanvasElement>('surface-canvas'), (swings) => {
             by('reset-view').textContent = swings ? 'Stop' : 'Reset view';
         });
         return this.view;
@@ -162,14 +177,18 @@ export class PointsTab {
         this.fresh = true;
         try {
             if (!this.view) {
-                say('cloud-note', 'Loading the viewer …');
+                say('surface-note', 'Loading the viewer …');
             }
-            const view = await this.viewer();
+            const [view, { mesh }] = await Promise.all([this.viewer(), import('./mesh')]);
             signal.throwIfAborted();
-            const cloud = await this.points(cameras);
-            signal.throwIfAborted();
-            view.show(cloud, cameras, this.size.width, this.size.height);
-            this.tally(cloud.confidences);
+            const maps = this.maps();
+            if (!maps) {
+                return;
+            }
+            const surface = mesh(maps, cameras, maps.left, 0);
+            view.show(surface, cameras, maps.width, maps.height);
+            [this.step, this.measured] = [surface.step, surface.measured];
+            this.tally(surface.confidences);
             this.reach();
             this.filter();
         } catch (error) {
@@ -177,7 +196,7 @@ export class PointsTab {
                 return;
             }
             this.fresh = false;
-            say('cloud-note', `The points cannot be shown: ${words(error)}`);
+            say('surface-note', `The surface cannot be shown: ${words(error)}`);
         }
     }
 
@@ -204,9 +223,34 @@ export class PointsTab {
         this.view?.atLeast(least);
         if (this.fresh) {
             const [shown, all] = [this.atLeast[least] ?? 0, this.atLeast[0] ?? 0];
-            by('points').dataset['points'] = String(shown);
-            const filled = 'Pixels that are filled or not trusted give none.';
-            say('cloud-note', `${least > 0 ? `${count(shown)} of ${count(all)}` : count(all)} points. ${filled}`);
+            by('surface').dataset['points'] = String(shown);
+            const every = this.step > 1 ? ` of one pixel in ${this.step * this.step}` : '';
+            const some = least > 0 ? `${count(shown)} of ${count(all)} points` : `${count(all)} points`;
+            const filled = all - this.measured;
+            const told = least === 0 && filled > 0 ? ` ${count(filled)} are filled; a least confidence of 1 hides them.` : '';
+            say('surface-note', `${some}${every}.${told}`);
+        }
+    }
+
+    /** Films the surface, and shares or saves the film. */
+    private async film(): Promise<void> {
+        const [view, maps] = [this.view, this.maps()];
+        if (!view || !maps || !this.fresh) {
+            return;
+        }
+        const signal = this.films.next(this.turns.signal);
+        const button = by<HTMLButtonElement>('film');
+        button.disabled = true;
+        say('surface-note', 'Filming one swing, 6 seconds …');
+        try {
+            await share(await view.film(`${maps.name}-film`, signal));
+            this.filter();
+        } catch (error) {
+            if (!signal.aborted) {
+                say('surface-note', `The film cannot be made: ${words(error)}`);
+            }
+        } finally {
+            button.disabled = false;
         }
     }
 }
