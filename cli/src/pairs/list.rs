@@ -35,6 +35,8 @@ pub(crate) const COLUMNS: [&str; 12] = [
     "prior_unit",
     "prior_pose",
 ];
+/// What to do about a header, for messages.
+const HEADER: &str = "begin the list with a header such as name,left,right";
 /// Columns that say how to use a prior.
 const OF_PRIOR: [&str; 4] = ["prior_sigma", "prior_kind", "prior_unit", "prior_pose"];
 const REQUIRED: usize = 3;
@@ -85,6 +87,22 @@ pub struct PriorRow {
     pub pose: Option<String>,
 }
 
+impl Row {
+    /// A pair of these images.
+    pub(crate) fn of_views(name: String, [left, right]: [String; 2], calibration: Vec<String>) -> Self {
+        Self {
+            name,
+            left,
+            right: Some(right),
+            mask: None,
+            calibration,
+            max_disparity: None,
+            min_disparity: None,
+            prior: None,
+        }
+    }
+}
+
 /// Reads a list, which may have no rows.
 ///
 /// # Errors
@@ -122,15 +140,15 @@ fn columns(header: &StringRecord) -> std::result::Result<Vec<&'static str>, Stri
     let mut columns = Vec::new();
     for field in header {
         let column = COLUMNS.into_iter().find(|column| *column == field);
-        let column =
-            column.ok_or_else(|| format!("unknown column {}; the header may name {known}", quoted(field)))?;
+        let column = column
+            .ok_or_else(|| format!("unknown column {}; {HEADER}; it may name {known}", quoted(field)))?;
         if columns.contains(&column) {
             return Err(format!("the column {column} appears twice; remove one"));
         }
         columns.push(column);
     }
     match COLUMNS[..REQUIRED].iter().find(|column| !columns.contains(column)) {
-        Some(missing) => Err(format!("the column {missing} is missing; the header may name {known}")),
+        Some(missing) => Err(format!("the column {missing} is missing; add it: the header may name {known}")),
         None => Ok(columns),
     }
 }

@@ -15,7 +15,7 @@ const EXTENSIONS: [&str; 11] =
 ///
 /// # Errors
 /// If there is no image, or two have the same stem.
-pub(super) fn list(path: &Path) -> Result<Option<Vec<PathBuf>>> {
+pub(crate) fn list(path: &Path) -> Result<Option<Vec<PathBuf>>> {
     let text = path.to_string_lossy();
     let (mut files, none) = if path.is_dir() {
         (in_folder(path)?, "contains no images")
@@ -104,7 +104,7 @@ fn of_numbers(path: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
 }
 
 /// The name of a file without its last extension.
-pub(super) fn stem(file: &Path) -> String {
+pub(crate) fn stem(file: &Path) -> String {
     file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 

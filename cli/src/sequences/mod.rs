@@ -1,6 +1,6 @@
 //! Sequences of pairs: numbered images, streams of frames, and recordings.
 
-mod files;
+pub(crate) mod files;
 pub(crate) mod known;
 mod pairing;
 mod recorded;
@@ -23,7 +23,7 @@ use mrfgs_ros::recording::Message;
 
 use crate::ffmpeg::Complaint;
 
-pub(crate) use pairing::Pairing;
+pub(crate) use pairing::{Pairing, pair};
 pub(crate) use recorded::Recorded;
 use recorded::RecordedViews;
 pub(crate) use rectifier::{Rectifier, turned};
@@ -167,7 +167,7 @@ impl Frames {
         let mut right = right.map(|right| Source::open(right, raw, reader)).transpose()?;
         if let (Source::Files { left: l, .. }, Some(Source::Files { left: r, .. })) = (&mut left, &mut right)
         {
-            let pairs = pairing::pair([mem::take(l).into(), mem::take(r).into()], pairing, &names)?;
+            let pairs = pair([mem::take(l).into(), mem::take(r).into()], pairing, &names)?;
             [*l, *r] = pairs.map(Into::into);
         }
         Ok(Self {

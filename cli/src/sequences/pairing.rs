@@ -24,7 +24,7 @@ pub(crate) enum Pairing {
 ///
 /// # Errors
 /// If an image without a partner may not be skipped, if all would be skipped, or if the counts differ in [`Pairing::Order`].
-pub(super) fn pair(
+pub(crate) fn pair(
     cameras: [Vec<PathBuf>; 2],
     pairing: Pairing,
     names: &[String; 2],

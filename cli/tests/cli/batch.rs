@@ -588,13 +588,91 @@ fn the_folders_in_a_folder_are_pairs() {
 }
 
 #[test]
+fn images_in_a_folder_per_camera_are_pairs() {
+    let folder = Folder::new();
+    let put = |scene_name: &str, paths: [&str; 2]| {
+        for (file, path) in ["im0.png", "im1.png"].into_iter().zip(paths) {
+            let path = folder.join(path);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::copy(scene(scene_name).join(file), path).unwrap();
+        }
+    };
+    put("slanted", ["photos/left/L_1.png", "photos/right/R_01.png"]);
+    put("wall", ["photos/left/L_2.png", "photos/right/R_02.png"]);
+    assert_eq!(batch(&folder, "photos out").succeeded().stderr, "mrfgs: 2 done, 0 skipped, 0 failed\n");
+    run(&folder, "match @wall/im0.png @wall/im1.png wall.pfm --max-disparity auto --device cpu").succeeded();
+    let all = maps(&folder.join("out"));
+    assert_eq!(all.keys().collect::<Vec<_>>(), ["L_1", "L_2"]);
+    assert!(all["L_2"] == maps(&folder)["wall"]);
+    assert_eq!(batch(&folder, "photos out").succeeded().stderr, "mrfgs: 0 done, 2 skipped, 0 failed\n");
+    batch(&folder, "photos deep --also depth").says("0 done, 0 skipped, 2 failed: L_1, L_2;");
+    // The calibration of all pairs.
+    let calib = "cam0=[100 0 120; 0 100 90; 0 0 1]\ndoffs=0\nbaseline=200\nndisp=32\n";
+    fs::write(folder.join("photos/calib.txt"), calib).unwrap();
+    batch(&folder, "photos deep --also depth").succeeded();
+    assert_eq!(record(&folder.join("deep"), "L_1")["labels"], 32);
+    put("wall", ["photos/left/L_3.png", "photos/right/R_4.png"]);
+    for more in ["", "--status"] {
+        batch(&folder, &format!("photos out {more}")).failed(1, "L_3.png & no partner & right & CSV");
+    }
+    fs::remove_file(folder.join("photos/left/L_3.png")).unwrap();
+    batch(&folder, "photos out").failed(1, "R_4.png & no partner & left");
+    // Folders with these names that hold a pair each.
+    copy("wall", &folder.join("left"));
+    copy("slanted", &folder.join("right"));
+    fs::create_dir(folder.join("scenes")).unwrap();
+    for side in ["left", "right"] {
+        fs::rename(folder.join(side), folder.join("scenes").join(side)).unwrap();
+    }
+    batch(&folder, "scenes own").succeeded();
+    assert_eq!(names(&folder.join("own"), ".pfm"), ["left", "right"]);
+}
+
+#[test]
+fn the_folders_of_kitti_are_pairs() {
+    let folder = Folder::new();
+    let projection = |camera: u32, offset: f64| {
+        format!(
+            "S_rect_0{camera}: 240 180\nR_rect_0{camera}: 1 0 0 0 1 0 0 0 1\nP_rect_0{camera}: 100 0 120 {offset} 0 100 90 0 0 0 1 0\n"
+        )
+    };
+    for (n, name) in ["slanted", "wall"].into_iter().enumerate() {
+        for (cameras, known) in [(["image_0", "image_1"], false), (["image_2", "image_3"], true)] {
+            for (camera, file) in cameras.into_iter().zip(["im0.png", "im1.png"]) {
+                let to = folder.join("training").join(camera);
+                fs::create_dir_all(&to).unwrap();
+                fs::copy(scene(name).join(file), to.join(format!("00000{n}_10.png"))).unwrap();
+            }
+            if known {
+                let to = folder.join("training/calib_cam_to_cam");
+                fs::create_dir_all(&to).unwrap();
+                let text = projection(2, 0.0) + &projection(3, -50.0);
+                fs::write(to.join(format!("00000{n}.txt")), text).unwrap();
+            }
+        }
+    }
+    batch(&folder, "training out --also depth").succeeded();
+    let found = record(&folder.join("out"), "000001_10");
+    assert_eq!(found["files"]["calibration"], "calib_cam_to_cam/000001.txt");
+    assert_eq!(found["files"]["left"], "image_2/000001_10.png");
+    // The calibration is for the colour images.
+    for camera in ["image_2", "image_3"] {
+        fs::remove_dir_all(folder.join("training").join(camera)).unwrap();
+    }
+    batch(&folder, "training grey").succeeded();
+    let found = record(&folder.join("grey"), "000001_10");
+    assert_eq!(found["files"]["left"], "image_0/000001_10.png");
+    assert!(found["files"]["calibration"].is_null());
+}
+
+#[test]
 fn a_bad_list_is_refused_before_anything_runs() {
     let folder = pairs(1, (64, 48));
     let long = format!("name,left,right\n{},l,r\n", "n".repeat(201));
     let lists = [
         ("", "contains no pairs & CSV"),
         ("name,left,right\n\n# nothing\n", "contains no pairs"),
-        ("a,l,r\n", "line 1 & unknown column `a` & name, left, right, max_disparity"),
+        ("a,l,r\n", "line 1 & unknown column `a` & with a header such as name,left,right; & max_disparity"),
         ("name,left,left\n", "line 1 & the column left appears twice"),
         ("name,left,max_disparity\n", "line 1 & the column right is missing"),
         ("name,left,right\na,l,r\n\n# comment\nb,l\n", "line 5 & 2 fields but 3 columns"),

@@ -79,6 +79,33 @@ fn evaluate_gives_the_same_figures_for_a_written_map() {
 }
 
 #[test]
+fn folders_of_maps_are_compared_by_name() {
+    let folder = Folder::new();
+    for dir in ["maps", "truth", "masks"] {
+        fs::create_dir(folder.join(dir)).unwrap();
+    }
+    for (name, pair) in [("1_10", "slanted"), ("2_10", "wall")] {
+        let line = format!(
+            "match @{pair}/im0.png @{pair}/im1.png maps/{name}.png --also preview,confidence --quiet"
+        );
+        run(&folder, &line).succeeded();
+        fs::copy(scene(pair).join("disp0GT.pfm"), folder.join(format!("truth/{name}.pfm"))).unwrap();
+        fs::copy(scene(pair).join("mask0nocc.png"), folder.join(format!("masks/{name}.png"))).unwrap();
+    }
+    let all = evaluated(&folder, "map maps --truth truth --mask masks --json -").json();
+    for (n, name) in ["1_10", "2_10"].into_iter().enumerate() {
+        let files = format!("map maps/{name}.png --truth truth/{name}.pfm --mask masks/{name}.png --json -");
+        assert_eq!(all["pairs"][n], evaluated(&folder, &files).json()["pairs"][0]);
+    }
+    evaluated(&folder, "map maps --truth truth --report page").prints("mean");
+    assert!(folder.join("page/index.html").is_file());
+    refused(&folder, "map maps/1_10.png --truth truth", 2, "--truth & truth is a folder & two folders");
+    refused(&folder, "map maps --truth none", 2, "--truth & maps is a folder but none is not & two folders");
+    fs::remove_file(folder.join("maps/2_10.png")).unwrap();
+    refused(&folder, "map maps --truth truth", 1, "maps & 2_10 & .png");
+}
+
+#[test]
 fn a_rounded_truth_has_whole_pixels() {
     let folder = Folder::new();
     let truth = read::read_disparity(&scene("slanted/disp0GT.pfm")).unwrap();

@@ -12,6 +12,8 @@ Examples:
   mrfgs batch pairs.csv maps
   mrfgs batch pairs.csv maps              # run it again to resume
   mrfgs batch MiddEval3/trainingQ maps --format png --also validity
+  mrfgs batch photos maps                 # from photos/left and photos/right
+  mrfgs batch KITTI2015/training maps --format png
   mrfgs batch pairs.csv maps --rectify --calib rig.yml
   mrfgs batch pairs.csv maps --status
   mrfgs batch pairs.csv maps --shard 3/8  # the third of eight machines
@@ -26,9 +28,13 @@ A list:
 ///
 /// LIST is a CSV file whose header names the columns: name, left, right, and optionally `max_disparity`, `min_disparity`, mask,
 /// calibration, prior, `prior_sigma`, `prior_kind`, `prior_unit` and `prior_pose`, which correspond to flags of `mrfgs match`; separate
-/// several calibration files with a semicolon. An empty field means no value; without a range, that of the calibration is searched, else one estimated from the images.
-/// Relative paths start at the folder of LIST; lines starting with # are comments. LIST may also be a folder: each visible folder in it is
-/// a pair, in one of the layouts of `mrfgs evaluate`; without a calib.txt the range is that of the ground truth.
+/// several calibration files with a semicolon. An empty field means no value; without a range, that of the calibration is searched, else one
+/// estimated from the images. Relative paths start at the folder of LIST; lines starting with # are comments.
+///
+/// LIST may also be a folder. If it holds the images of the cameras in the folders left and right, or in KITTI's `image_2` and `image_3`,
+/// `colored_0` and `colored_1`, or `image_0` and `image_1`, those with the same number are a pair, named after the left one. Colour pairs of
+/// KITTI take their calibrations from `calib_cam_to_cam` or calib, others the calib.txt in LIST. Else each visible folder in LIST is a pair,
+/// in one of the layouts of `mrfgs evaluate`; without a calib.txt the range is that of the ground truth.
 ///
 /// Names become file names: at most 200 bytes, letters of any script and spaces, but none of / \ : * ? " < > | and control characters, no
 /// leading . or -, no trailing . or space. Names must differ by more than case.
@@ -42,7 +48,7 @@ A list:
 #[derive(clap::Args, Serialize)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// CSV file with a row per pair, or folder with a folder per pair
+    /// CSV file with a row per pair, folder with the folders left and right, or folder with a folder per pair
     #[serde(skip)]
     pub(super) list: PathBuf,
     /// Folder for maps and records; created if it does not exist

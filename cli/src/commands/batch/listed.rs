@@ -1,4 +1,4 @@
-//! The pairs of a batch: rows of a list, or folders in a folder. A list with a mistake is refused as a whole.
+//! The pairs of a batch: rows of a list, folders in a folder, or the images in two folders. A list with a mistake is refused as a whole.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,6 +15,8 @@ use crate::outputs::{Also, Files};
 use crate::pairs::folder::{self, CALIBRATION, Folder};
 use crate::pairs::input;
 use crate::pairs::list::{self, Names, PriorRow, Row};
+
+use super::cameras;
 
 /// The columns of a prior, for messages.
 const PRIOR_COLUMNS: PriorNames =
@@ -66,24 +68,30 @@ pub(super) struct LoadedPair {
 }
 
 impl List {
-    /// Reads the list `path`, or the names of the folders in the folder `path`.
+    /// Reads the list `path`, or finds the pairs in the folder `path`.
     ///
     /// # Errors
     /// [`Error::Read`], with the line number if there is one, for a list that is unreadable, malformed or empty.
     pub(super) fn read(path: &Path) -> Result<Self> {
-        let list = if path.is_dir() { Self::of_folders(path)? } else { Self::of_rows(path)? };
+        let list = if !path.is_dir() {
+            Self::of_rows(path.parent().unwrap_or(Path::new("")), list::read(path)?)
+        } else if let Some(rows) = cameras::pairs(path)? {
+            Self::of_rows(path, rows)
+        } else {
+            Self::of_folders(path)?
+        };
         if list.pairs.is_empty() {
-            let reason =
-                "contains no pairs; give a CSV file with a row per pair, or a folder with a folder per pair";
+            let reason = "contains no pairs; give a CSV file with a row per pair, a folder with a folder per pair, or one with the \
+                          images in the folders left and right";
             return Err(Error::read(path, reason).into());
         }
         Ok(list)
     }
 
-    fn of_rows(path: &Path) -> Result<Self> {
-        let rows = list::read(path)?.into_iter();
-        let pairs = rows.map(|row| Listed { name: row.name.clone(), source: Source::Row(row) });
-        Ok(Self { base: path.parent().unwrap_or(Path::new("")).to_owned(), pairs: pairs.collect() })
+    /// The pairs in `rows`, whose relative paths start at `base`.
+    fn of_rows(base: &Path, rows: Vec<Row>) -> Self {
+        let pairs = rows.into_iter().map(|row| Listed { name: row.name.clone(), source: Source::Row(row) });
+        Self { base: base.to_owned(), pairs: pairs.collect() }
     }
 
     /// A pair for each visible folder, in the order of their names.

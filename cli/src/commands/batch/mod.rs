@@ -1,6 +1,7 @@
 //! `mrfgs batch`.
 
 mod args;
+mod cameras;
 mod listed;
 mod request;
 
