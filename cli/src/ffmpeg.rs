@@ -215,7 +215,8 @@ fn file(path: &Path) -> std::ffi::OsString {
 fn missing(error: &io::Error, does: &str) -> String {
     match error.kind() {
         ErrorKind::NotFound => {
-            format!("ffmpeg {does} this format but is not on the PATH; install it, or use NAME.y4m")
+            let instead = if does == "decodes" { "a folder of frames or NAME.y4m" } else { "NAME.y4m" };
+            format!("ffmpeg {does} this format but is not on the PATH; install it, or give {instead}")
         }
         _ => format!("ffmpeg, which {does} this format, cannot be run: {}", in_words(error)),
     }

@@ -32,6 +32,10 @@ pub(crate) const FLAGS: Vocabulary = Vocabulary {
 pub(crate) const NUMBERS: Vocabulary =
     Vocabulary { unit: Some("give the right one with the number, such as 120mm, 12cm or 0.12m"), ..FLAGS };
 
+/// Words for cameras of a recording or of live topics, whose messages have no entry for the unit.
+pub(crate) const MESSAGES: Vocabulary =
+    Vocabulary { unit: Some("give another calibration with --calib"), ..FLAGS };
+
 /// Words for a list of pairs, where --rectify needs a calibration.
 pub(crate) const COLUMNS: Vocabulary = Vocabulary {
     min: "min_disparity",

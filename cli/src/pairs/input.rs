@@ -34,8 +34,8 @@ pub(crate) struct PairArgs {
 
     #[command(flatten)]
     pub(crate) search: Search,
-    /// Calibration, for the range (ndisp of a calib.txt) and for depth and points. OpenCV, ROS (two files, each with --calib), Kalibr,
-    /// KITTI, Middlebury and others [default: a calib.txt beside LEFT]
+    /// Calibration, for the range (ndisp of a calib.txt) and for depth and points. OpenCV, ROS, Kalibr, KITTI, Middlebury and others; each
+    /// of several files with its own --calib [default: a calib.txt beside LEFT]
     #[arg(long, value_name = "FILE")]
     pub(crate) calib: Vec<PathBuf>,
     #[command(flatten)]
@@ -323,8 +323,8 @@ impl<V> Input<V> {
     /// The unit of depths for messages; `None` without a calibration.
     pub(crate) fn unit(&self) -> Option<String> {
         self.calibration.as_ref().map(|known| {
-            let by = known.named().0;
-            unit(known.calibration.unit, (!known.is_of_flags()).then_some(by))
+            let files = shown(&known.files);
+            unit(known.calibration.unit, (!known.is_of_flags()).then_some(files.as_ref()))
         })
     }
 
@@ -504,11 +504,17 @@ pub(crate) fn behind_views(
     if next.is_none() && list::holds_both(left) {
         *next = right.take();
     } else if right.is_none() {
-        let reason =
-            format!("missing; {} holds one view only (.mpo and .jps files hold both)", left.display());
-        return Err(Failure::usage("RIGHT", reason));
+        return Err(without_right(left));
     }
     Ok(())
+}
+
+/// There is no image beside `left`, which holds one view.
+pub(crate) fn without_right(left: &Path) -> Failure {
+    let left = left.display();
+    let reason =
+        format!("missing; {left} holds one view by its name (those of files with both end in .mpo or .jps)");
+    Failure::usage("RIGHT", reason)
 }
 
 /// Reads a raw pair from two files, which may differ in size, or from one file with both views.
@@ -558,7 +564,7 @@ fn doubts_of(
     (name, calibration): (&Path, &Calibration),
     (width, _): (usize, usize),
 ) -> impl Iterator<Item = String> {
-    let words = if name == Path::new(NUMBERS) { &remedy::NUMBERS } else { &remedy::FLAGS };
+    let words = words_of(name);
     let doubts = Doubt::about(calibration, Some(width)).into_iter();
     doubts.map(move |doubt| format!("{}: {}", name.display(), remedy::doubt(&doubt, words)))
 }
@@ -593,7 +599,17 @@ fn trusted(trust: &Trust) -> String {
 
 fn doubts(by: &Rectification, files: &[PathBuf]) -> impl Iterator<Item = String> {
     let of = if files.is_empty() { String::new() } else { format!("{}: ", shown(files)) };
-    by.doubts().iter().map(move |doubt| format!("{of}{}", remedy::doubt(doubt, &remedy::FLAGS)))
+    let words = files.first().map_or(&remedy::FLAGS, |file| words_of(file));
+    by.doubts().iter().map(move |doubt| format!("{of}{}", remedy::doubt(doubt, words)))
+}
+
+/// The words for a calibration of this `name`: that of a flag, a file, or a topic, which is no file.
+fn words_of(name: &Path) -> &'static remedy::Vocabulary {
+    match name {
+        name if name == Path::new(NUMBERS) => &remedy::NUMBERS,
+        name if name.exists() => &remedy::FLAGS,
+        _ => &remedy::MESSAGES,
+    }
 }
 
 fn say(warning: &str) {

@@ -101,13 +101,15 @@ fn failures_of_ffmpeg_are_reported() {
         .failed(2, "OUTPUT & already");
     let empty = folder.join("empty");
     fs::create_dir(&empty).unwrap();
-    for line in ["whole.mp4 maps", "plain.y4m film.mp4"] {
+    for (line, instead) in
+        [("whole.mp4 maps", "a folder of frames or NAME.y4m"), ("plain.y4m film.mp4", "or give NAME.y4m")]
+    {
         let said = run_with(
             &folder,
             &format!("sequence {line} --quiet {RANGE}"),
             &[("PATH", empty.to_str().unwrap())],
         );
-        said.failed(1, "mp4 & not on the PATH & install it & NAME.y4m");
+        said.failed(1, &format!("mp4 & not on the PATH & install it & {instead}"));
     }
     fs::remove_dir(&empty).unwrap();
     assert_eq!(files(&folder), before);

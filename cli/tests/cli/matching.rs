@@ -562,6 +562,9 @@ fn both_views_may_be_in_one_file() {
     assert!(same(&wanted, &read_pfm(folder.join("turned.pfm"))) > 97);
     run(&folder, &format!("match both.jps {flags}")).failed(2, "OUTPUT & missing");
     run(&folder, &format!("match left.png right.png {flags}")).failed(2, "OUTPUT & missing");
+    // The name of the map is not taken for a view.
+    run(&folder, &format!("match left.png new.pfm {flags}"))
+        .failed(2, "RIGHT & missing & left.png & .mpo or .jps");
     run(&folder, "rectify both.jps").failed(2, "DIR & missing");
     run(&folder, "rectify left.png").failed(2, "RIGHT & missing & left.png holds one view");
 }

@@ -230,6 +230,20 @@ fn recordings_give_the_maps_of_match() {
     assert_eq!(found(&folder.join("of-bag"), &["pfm"]), wanted);
 }
 
+/// A message has no entry for the unit, so the remedy is another calibration.
+#[test]
+fn a_doubtful_unit_in_a_recording_is_reported() {
+    let folder = Folder::new();
+    let mut messages = [cameras(SIZE), images("image_rect", 0)].concat();
+    let right = &mut messages[1].2;
+    let offset = right.windows(8).position(|bytes| bytes == (-12.0_f64).to_le_bytes()).unwrap();
+    right[offset..offset + 8].copy_from_slice(&(-0.012_f64).to_le_bytes());
+    record(&folder.join("drive.mcap"), &messages);
+    run(&folder, &format!("sequence drive.mcap maps {RANGE} --also depth")).succeeded().says(
+        "drive.mcap:/left/camera_info: & 0.0002 m apart & the unit may be wrong: give another calibration with --calib",
+    );
+}
+
 /// The calibration in a recording is equivalent to ROS's own files.
 #[test]
 fn calibrations_in_recordings_are_those_of_files() {

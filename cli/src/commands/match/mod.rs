@@ -29,6 +29,10 @@ use request::Request;
 pub(crate) fn run(mut args: Args) -> Result<()> {
     args.pair.leave(&mut args.output)?;
     if args.output.is_none() {
+        // The only name after that of one view is that of the map.
+        if args.pair.right.as_ref().is_some_and(|right| !right.exists()) {
+            return Err(input::without_right(&args.pair.left));
+        }
         return Err(Failure::usage("OUTPUT", "missing; give a file for the map, such as disparity.pfm"));
     }
     stop::listen();
