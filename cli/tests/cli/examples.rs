@@ -38,6 +38,7 @@ const NOT_RUN: &[(&str, &str)] = &[
         "python python/examples/satellite.py left.tif right.tif surface.tif --folder job --resolution 0.5 --workers 4",
         "Python with rasterio; scripts/geo tries it",
     ),
+    ("pip install ./python rasterio", "installs; scripts/geo tries it"),
     (
         "mrfgs batch KITTI2015/training maps --format png --also depth",
         "needs KITTI; a test makes such folders",
