@@ -139,6 +139,11 @@ fn readonly<'py, T: Element>(array: &Bound<'py, PyUntypedArray>) -> Option<PyRea
 
 impl<'py> Image<'py> {
     pub(crate) fn of(name: &'static str, given: &Bound<'py, PyAny>) -> PyResult<Self> {
+        if given.is_none() {
+            return Err(PyTypeError::new_err(format!(
+                "{name}: is None, as OpenCV returns for a file that it cannot read; check the name of the file"
+            )));
+        }
         let array = array(name, given)?;
         let masked = masked(name, &array)?;
         let by_type = readonly(&array)

@@ -510,6 +510,7 @@ class Match(unittest.TestCase):
              lambda: mrfgs.match(left.astype(np.int64) - 1 - left.min(), right, 15)),
             (ValueError, "right: is uint32 and contains 65536; integers", lambda: mrfgs.match(left, np.full((60, 80), 65536, np.uint32), 15)),
             (ValueError, "has pixels", lambda: mrfgs.match(left[:0].astype(int), right[:0].astype(int), 15)),
+            (TypeError, "right: is None, as OpenCV returns for a file that it cannot read; check the name", lambda: mrfgs.match(left, None, 15)),
             (TypeError, "left: give an array of integers, float16, float32 or float64, not bool; convert it with astype", lambda: mrfgs.match(left > 9, right, 15)),
             (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not 63.5", lambda: mrfgs.match(left, right, 63.5)),
             (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not NaN", lambda: mrfgs.match(left, right, np.nan)),
