@@ -22,6 +22,7 @@ mod table;
 mod text;
 
 use std::panic;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
@@ -146,6 +147,13 @@ fn one_line(error: &clap::Error) -> String {
         return format!(
             "give a command: {} or {last}; see `mrfgs --help`, or try `mrfgs demo`",
             others.join(", ")
+        );
+    }
+    let first = std::env::args_os().nth(1).unwrap_or_default();
+    if error.kind() == ErrorKind::InvalidSubcommand && Path::new(&first).exists() {
+        let file = Path::new(&first).display();
+        return format!(
+            "give a command before {file}, such as `mrfgs match LEFT RIGHT map.pfm`; see `mrfgs --help`"
         );
     }
     let text = error.render().to_string();

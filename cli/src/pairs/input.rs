@@ -12,10 +12,12 @@ use mrfgs::options::DisparityRange;
 use mrfgs::rectification::{Doubt, Options, Rectification, Trust};
 use mrfgs::region::Region;
 use mrfgs::{Error, Matched};
+use mrfgs_ros::recording::Recording;
 
 use crate::args::{CameraArgs, CameraNeed, CropArgs, ReadingArgs, ResolvedRange, Search, Sign, shown};
 use crate::console;
 use crate::failure::{self, Failure, Result};
+use crate::ffmpeg;
 use crate::matching::SearchSpace;
 use crate::outputs::Files;
 use crate::pairs::folder::CALIBRATION;
@@ -462,8 +464,20 @@ pub(crate) fn views(
     mask: Option<&Path>,
 ) -> mrfgs::Result<Pair> {
     match right {
-        Some(right) => reader.pair(left, right, mask),
+        Some(right) => reader.pair(left, right, mask).map_err(|e| turned(reader, [left, right], e)),
         None => Ok(ordered(reader.both(left, mask)?, mask)),
+    }
+}
+
+/// Adds the remedy to the `error` of a pair, if one of its images lies on its side: phones say so in a tag.
+fn turned(reader: Reader, files: [&Path; 2], error: Error) -> Error {
+    let [left, right] = files.map(|file| reader.size(file));
+    match (error, left, right) {
+        (Error::Mismatch(reason), Ok((w, h)), Ok(right)) if w != h && right == (h, w) => {
+            let remedy = "turn them with --orient, or add --rectify to photos taken by hand";
+            Error::Mismatch(format!("{reason}; {remedy}"))
+        }
+        (error, ..) => error,
     }
 }
 
@@ -511,7 +525,13 @@ pub(crate) fn behind_views(
 
 /// There is no image beside `left`, which holds one view.
 pub(crate) fn without_right(left: &Path) -> Failure {
+    let is_film = ffmpeg::writes(left) || left.extension().is_some_and(|end| end.eq_ignore_ascii_case("y4m"));
+    let holds_many = is_film || Recording::is(left);
     let left = left.display();
+    if holds_many {
+        let reason = format!("{left} holds many pairs; match them with `mrfgs sequence {left} maps`");
+        return Failure::usage("LEFT", reason);
+    }
     let reason =
         format!("missing; {left} holds one view by its name (those of files with both end in .mpo or .jps)");
     Failure::usage("RIGHT", reason)

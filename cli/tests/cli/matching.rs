@@ -562,6 +562,16 @@ fn both_views_may_be_in_one_file() {
     assert!(same(&wanted, &read_pfm(folder.join("turned.pfm"))) > 97);
     run(&folder, &format!("match both.jps {flags}")).failed(2, "OUTPUT & missing");
     run(&folder, &format!("match left.png right.png {flags}")).failed(2, "OUTPUT & missing");
+    for many in ["a.y4m", "a.MP4", "a.bag", "a.mcap"] {
+        run(&folder, &format!("match {many} new.pfm"))
+            .failed(2, &format!("LEFT & {many} holds many pairs & mrfgs sequence"));
+    }
+    // The command is missing.
+    run(&folder, "left.png right.png map.pfm").failed(2, "a command before left.png & mrfgs match & --help");
+    run(&folder, "lift.png").failed(2, "lift.png & --help");
+    // An image lies on its side.
+    image::open(folder.join("right.png")).unwrap().rotate90().save(folder.join("upright.png")).unwrap();
+    run(&folder, "match left.png upright.png map.pfm").failed(1, "the same size & --orient & --rectify");
     // The name of the map is not taken for a view.
     run(&folder, &format!("match left.png new.pfm {flags}"))
         .failed(2, "RIGHT & missing & left.png & .mpo or .jps");
