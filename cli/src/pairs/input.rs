@@ -260,7 +260,12 @@ impl Input {
     }
 
     /// The input for a pair that `by` rectified without a calibration, with the range to `search`, counted by `sign`.
-    fn rectified_alone(pair: Pair, by: Rectification, search: &Search, sign: Sign) -> Result<Self> {
+    pub(crate) fn rectified_alone(
+        pair: Pair,
+        by: Rectification,
+        search: &Search,
+        sign: Sign,
+    ) -> Result<Self> {
         Self::with_range(pair, search, sign, None, None, Some(by))
     }
 }

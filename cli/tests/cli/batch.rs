@@ -250,15 +250,41 @@ fn a_batch_takes_calibrations() {
     // Another rectification is another request.
     batch(&folder, "list.csv column --rectify --also depth").succeeded().says("1 done");
     assert!(at("one.pfm") != at("column/raw.pfm"));
-    // Unrectified cameras give no depth of rectified images, and a pair without a calibration cannot be rectified.
+    // Unrectified cameras give no depth of rectified images, and neither does a pair without a calibration.
     let told = batch(&folder, "list.csv raw-pair --also depth");
     told.says("raw: cannot read raw/cameras.yml: describes images that are not rectified");
     assert_eq!(told.code, Some(1));
     list("raw,raw/left.png,raw/right.png,40,");
-    let told = batch(&folder, "list.csv none --rectify");
-    told.says("raw: --rectify: needs a calibration; give one per pair in the column calibration");
+    let told = batch(&folder, "list.csv none --rectify --also depth");
+    told.says(
+        "raw: --also depth: without a calibration there is no scale & in the column calibration & --calib",
+    );
     assert_eq!(told.code, Some(1));
     batch(&folder, "list.csv none --alpha 1").failed(2, "--alpha & --rectify");
+}
+
+#[test]
+fn a_batch_rectifies_pairs_without_a_calibration() {
+    let folder = Folder::new();
+    for side in ["left", "right"] {
+        fs::create_dir_all(folder.join("photos").join(side)).unwrap();
+        fs::copy(scene(&format!("raw/{side}.png")), folder.join(format!("photos/{side}/1.png"))).unwrap();
+    }
+    batch(&folder, "photos out --rectify --also preview").succeeded();
+    let line =
+        "match @raw/left.png @raw/right.png 1.pfm --rectify --device cpu --also preview --json one.json";
+    run(&folder, line).succeeded();
+    for file in ["1.pfm", "1.preview.png"] {
+        assert!(
+            fs::read(folder.join(file)).unwrap() == fs::read(folder.join("out").join(file)).unwrap(),
+            "{file}"
+        );
+    }
+    let (found, one) = (record(&folder.join("out"), "1"), json(folder.join("one.json")));
+    assert_eq!((&found["trust"], &found["rectified"]), (&one["trust"], &true.into()));
+    assert!(found["files"]["calibration"].is_null() && found["trust"]["matches"].as_u64().unwrap() > 50);
+    batch(&folder, "photos out --rectify --also preview").succeeded().says("1 skipped");
+    batch(&folder, "photos raw").says("1 failed");
 }
 
 #[test]

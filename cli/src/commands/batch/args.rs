@@ -64,7 +64,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     #[serde(flatten)]
     pub(super) crop: CropArgs,
-    /// Rectifies raw pairs first, each by its calibration, as `mrfgs rectify` does
+    /// Rectifies raw pairs first, each by its calibration or without one from its own matches, as `mrfgs rectify` does
     #[arg(long)]
     pub(super) rectify: bool,
     #[command(flatten)]

@@ -173,14 +173,18 @@ impl Listed {
     /// Reads the images, resolves the range, and reads the cameras if an output needs them.
     pub(super) fn read(&self, base: &Path, reader: Reader, given: &BatchSettings) -> Result<LoadedPair> {
         let at = |path: &String| base.join(path);
-        let mut calib = given.calib.to_vec();
+        let calib = match &self.source {
+            Source::Row(row) if !row.calibration.is_empty() => row.calibration.iter().map(at).collect(),
+            _ => given.calib.to_vec(),
+        };
+        // How to rectify the pair without a calibration.
+        let alone = given.rectify.as_ref().filter(|_| calib.is_empty());
+        let reader = Reader { orient: reader.orient || alone.is_some(), ..reader };
         let (pair, range, [left, right], mask) = match &self.source {
-            Source::Row(Row { left, right, mask, calibration, .. }) => {
-                if !calibration.is_empty() {
-                    calib = calibration.iter().map(at).collect();
-                }
+            Source::Row(Row { left, right, mask, .. }) => {
                 let (other, mask_file) = (right.as_ref().map(at), mask.as_ref().map(at));
-                let views = if given.rectify.is_some() { input::raw_views } else { input::views };
+                let is_raw = given.rectify.is_some() && alone.is_none();
+                let views = if is_raw { input::raw_views } else { input::views };
                 let pair = views(reader, &at(left), other.as_deref(), mask_file.as_deref())?;
                 (pair, None, [left, right.as_ref().unwrap_or(left)].map(Clone::clone), mask.clone())
             }
@@ -197,10 +201,6 @@ impl Listed {
             }
         };
         let search = range.map_or_else(|| self.search(), Search::from);
-        if given.rectify.is_some() && calib.is_empty() {
-            let reason = "needs a calibration; give one per pair in the column calibration, or one for all with --calib";
-            return Err(Failure::usage("--rectify", reason));
-        }
         let left_image = at(&left);
         let pose = self.prior().and_then(|prior| prior.pose.as_ref()).map(at);
         let prior_path = self.prior().map(|prior| at(&prior.file));
@@ -208,23 +208,28 @@ impl Listed {
         let prior = prior.map(|(row, path)| prior_file(row, path, pose.as_deref()));
         let of_prior = prior.as_ref().and_then(PriorFile::need);
         let need = CameraNeed::strictest([given.cameras.map(Also::need), of_prior]);
-        let beside = Some(&*left_image).filter(|_| need.is_some() || search.takes_calibration());
-        let input = input::Input::new(
-            pair,
-            &search,
-            Sign::default(),
-            input::Calib::Files(&calib, given.crop),
-            None,
-            given.rectify.as_ref(),
-            beside,
-        )?;
+        let input = if let Some(options) = alone {
+            if let Some(need) = need.as_ref().filter(|need| !need.optional) {
+                let reason = "without a calibration there is no scale and so no depth; give one per pair in the column calibration, or \
+                              one for all with --calib";
+                return Err(Failure::usage(&need.flag, reason));
+            }
+            let (by, pair) = input::rectify_alone([&left_image, &at(&right)], &pair, options)?;
+            input::Input::rectified_alone(pair, by, &search, Sign::default())?
+        } else {
+            let beside = Some(&*left_image).filter(|_| need.is_some() || search.takes_calibration());
+            let calib = input::Calib::Files(&calib, given.crop);
+            input::Input::new(pair, &search, Sign::default(), calib, None, given.rectify.as_ref(), beside)?
+        };
         let known = input.rig(need.as_ref(), &left_image)?;
         let rig = known.filter(|_| given.cameras.is_some());
         let calibration = match &self.source {
             Source::Row(row) if self.has_calibration() => Some(row.calibration.join(", ")),
             _ if !calib.is_empty() => input.calibration_files(),
             Source::Row(_) => input.calibration_files().map(|_| calibration_beside(&left)),
-            Source::Folder => Some(calibration_beside(&left)).filter(|path| at(path).exists()),
+            Source::Folder => {
+                Some(calibration_beside(&left)).filter(|path| alone.is_none() && at(path).exists())
+            }
         };
         let view = PriorView { size: input.pair.size(), sign: Sign::default(), rig: input.as_taken(known) };
         let prior = prior.map(|prior| prior.read(view)).transpose()?;

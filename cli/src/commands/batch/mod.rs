@@ -286,6 +286,7 @@ impl<'a> Batch<'a> {
         let (read, matched, time, warnings) = self.compute(listed, matcher)?;
         let LoadedPair { input, rig, mut files, .. } = read;
         let (range, rectifying) = (matched.range(), input.rectifying());
+        let trust = input.rectification.as_ref().and_then(|by| by.trust().copied());
         let pair = input.pair;
         let wanted = &self.args.maps;
         let georeferences = pair.georeferences();
@@ -296,7 +297,7 @@ impl<'a> Batch<'a> {
         self.named(claim, wanted.write(claim.folder(), &listed.name, &outcome))?;
         files.output = Some(wanted.map(&listed.name));
         let mut found = MatchRecord::new(&files, &matched, time, sign);
-        found.rectified = self.args.rectify;
+        (found.rectified, found.trust) = (self.args.rectify, trust);
         let text = request.done(&record, claim.folder(), found, &warnings)?;
         self.publish(claim, request.outputs(), &record, &text)?;
         Ok((matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)), warnings))
