@@ -88,12 +88,17 @@ pub struct PriorRow {
 }
 
 impl Row {
-    /// A pair of these images.
-    pub(crate) fn of_views(name: String, [left, right]: [String; 2], calibration: Vec<String>) -> Self {
+    /// A pair of these images; without a right one, the left file holds both views.
+    pub(crate) fn of_views(
+        name: String,
+        left: String,
+        right: Option<String>,
+        calibration: Vec<String>,
+    ) -> Self {
         Self {
             name,
             left,
-            right: Some(right),
+            right,
             mask: None,
             calibration,
             max_disparity: None,

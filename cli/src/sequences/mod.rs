@@ -23,7 +23,7 @@ use mrfgs_ros::recording::Message;
 
 use crate::ffmpeg::Complaint;
 
-pub(crate) use pairing::{Pairing, pair};
+pub(crate) use pairing::{Pairing, in_name, pair};
 pub(crate) use recorded::Recorded;
 use recorded::RecordedViews;
 pub(crate) use rectifier::{Rectifier, turned};

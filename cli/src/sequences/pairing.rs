@@ -74,7 +74,7 @@ fn partners(
 }
 
 /// The numbers in a name, without leading zeros.
-type Numbers = Vec<String>;
+pub(crate) type Numbers = Vec<String>;
 
 /// For each camera, the numbers in which its names differ; `None` if numbers alone do not identify its images.
 fn numbers(cameras: &[Vec<PathBuf>; 2]) -> Option<[Vec<Numbers>; 2]> {
@@ -103,7 +103,7 @@ fn numbers(cameras: &[Vec<PathBuf>; 2]) -> Option<[Vec<Numbers>; 2]> {
 }
 
 /// The numbers in `name`.
-fn in_name(name: &str) -> Numbers {
+pub(crate) fn in_name(name: &str) -> Numbers {
     let digits = name.split(|c: char| !c.is_ascii_digit()).filter(|digits| !digits.is_empty());
     digits.map(|digits| digits.trim_start_matches('0').to_owned()).collect()
 }

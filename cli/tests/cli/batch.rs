@@ -643,6 +643,12 @@ fn images_in_a_folder_per_camera_are_pairs() {
     }
     fs::remove_file(folder.join("photos/left/L_3.png")).unwrap();
     batch(&folder, "photos out").failed(1, "R_4.png & no partner & left");
+    // Names without numbers must be the same.
+    put("slanted", ["named/left/cat.png", "named/right/cat.png"]);
+    put("wall", ["named/left/dog.png", "named/right/eel.png"]);
+    batch(&folder, "named out").failed(1, "dog.png & no partner & name in right");
+    fs::rename(folder.join("named/right/eel.png"), folder.join("named/right/dog.png")).unwrap();
+    batch(&folder, "named by-name").succeeded().says("2 done");
     // Folders with these names that hold a pair each.
     copy("wall", &folder.join("left"));
     copy("slanted", &folder.join("right"));

@@ -543,6 +543,12 @@ fn both_views_may_be_in_one_file() {
     run(&folder, &format!("match left.png right.png wanted.pfm {flags}")).succeeded();
     fs::write(folder.join("pairs.csv"), "name,left,right,max_disparity\na,both.jps,,31\n").unwrap();
     run(&folder, "batch pairs.csv out --device cpu").succeeded();
+    // A folder of such files is a list.
+    fs::create_dir(folder.join("shots")).unwrap();
+    fs::copy(folder.join("both.jps"), folder.join("shots/a.JPS")).unwrap();
+    fs::write(folder.join("shots/.b.mpo"), "").unwrap();
+    run(&folder, "batch shots shown --device cpu").succeeded().says("1 done, 0 skipped, 0 failed");
+    assert!(folder.join("shown/a.pfm").is_file());
     // The test's decoder may round chroma differently.
     let (wanted, found) = (read_pfm(folder.join("wanted.pfm")), read_pfm(folder.join("out/a.pfm")));
     let same = |a: &Plane<f32>, b: &Plane<f32>| {

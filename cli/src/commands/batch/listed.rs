@@ -82,7 +82,7 @@ impl List {
         };
         if list.pairs.is_empty() {
             let reason = "contains no pairs; give a CSV file with a row per pair, a folder with a folder per pair, or one with the \
-                          images in the folders left and right";
+                          images in the folders left and right, or with .mpo files";
             return Err(Error::read(path, reason).into());
         }
         Ok(list)
