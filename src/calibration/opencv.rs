@@ -268,7 +268,7 @@ pub(super) fn camera(entry: &Entry) -> Result<([f64; 2], [f64; 2])> {
 /// The rotation from the left camera to another one, which errors call `other`.
 pub(super) fn rotation_of(entries: &Entries, what: &str) -> Result<Matrix> {
     let expected = format!("{what}, 3 x 3 or a rotation vector");
-    let entry = entries.require(ROTATION, "R", &expected)?;
+    let entry = entries.require(ROTATION, "R", &format!("{expected}, here or in a further file"))?;
     match entry.numbers::<3>(&expected) {
         Ok(vector) => Ok(rotation(vector)),
         Err(_) => entry.rotation(&entry.matrix()?),

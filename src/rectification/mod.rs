@@ -101,7 +101,7 @@ impl Rectification {
         let error = |reason: &str| Error::Calibration(reason.into());
         let lenses = calibration
             .lenses
-            .ok_or_else(|| error("lacks the lenses (K1, D1, K2 and D2), which rectification needs"))?;
+            .ok_or_else(|| error("lacks the lenses (K1, D1, K2 and D2), which rectification needs; give the file that has them, too"))?;
         let views = match (calibration.views, &calibration.pose) {
             (Some(views), pose) if options.alpha.is_none() => {
                 pose.as_ref().map_or(Ok(()), |pose| views.check(pose))?;
@@ -116,7 +116,9 @@ impl Rectification {
                 views::choose(&[left_lens, right_lens], pose, size, options)?
             }
             _ => {
-                return Err(error("lacks the pose of the right camera (R and T), which rectification needs"));
+                return Err(error(
+                    "lacks the pose of the right camera (R and T), which rectification needs; give the file that has it, too",
+                ));
             }
         };
         let mut doubts: Vec<_> = fits.into_iter().flatten().map(|fit| Doubt::OtherSize { fit }).collect();
