@@ -1,8 +1,15 @@
 //! Formatting of short texts.
 
+use std::path::Path;
+
 /// Joins the lines of a text into one.
 pub(crate) fn single_line(text: &str) -> String {
     text.lines().map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
+/// A path as text.
+pub(crate) fn shown(path: &Path) -> String {
+    path.display().to_string()
 }
 
 /// The plural ending of a noun after `count`.

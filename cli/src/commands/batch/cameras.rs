@@ -11,7 +11,7 @@ use crate::pairs::folder::{CALIBRATION, Folder};
 use crate::pairs::list::{Names, Row, holds_both};
 use crate::sequences::{Pairing, files, in_name, pair};
 
-use super::listed::shown;
+use crate::text::shown;
 
 /// KITTI's folders of grey images, whose cameras are not those that its calibrations are read for.
 const GREY: [&str; 2] = ["image_0", "image_1"];

@@ -15,6 +15,7 @@ use crate::outputs::{Also, Files};
 use crate::pairs::folder::{self, CALIBRATION, Folder};
 use crate::pairs::input;
 use crate::pairs::list::{self, Names, PriorRow, Row};
+use crate::text::shown;
 
 use super::cameras;
 
@@ -249,10 +250,6 @@ impl Listed {
 fn prior_file<'a>(row: &PriorRow, path: &'a Path, pose: Option<&'a Path>) -> PriorFile<'a> {
     let &PriorRow { sigma, kind, unit, .. } = row;
     PriorFile { path, sigma, kind, unit, pose: pose.map(CloudPose::File), names: PRIOR_COLUMNS }
-}
-
-pub(super) fn shown(path: &Path) -> String {
-    path.display().to_string()
 }
 
 fn calibration_beside(left: &str) -> String {

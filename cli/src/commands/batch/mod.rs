@@ -25,10 +25,11 @@ use crate::args::Sign;
 use crate::failure::{self, Failure, Result};
 use crate::outputs::{Claim, Format, MatchRecord, Outcome, also, files};
 use crate::progress::Counter;
+use crate::text::shown;
 use crate::{console, remedy, stop};
 
 pub(crate) use args::Args;
-use listed::{BatchSettings, List, Listed, LoadedPair, shown};
+use listed::{BatchSettings, List, Listed, LoadedPair};
 use request::{Request, State};
 
 /// How long to wait while other runs match the remaining pairs.
