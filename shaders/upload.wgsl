@@ -10,7 +10,7 @@ struct Params {
     full_pitch: u32,
     // Whether the highest byte of a word counts for nothing.
     is_opaque: u32,
-    // What the bytes of a word are: 0 red, green, blue and alpha; 1 blue, green, red and alpha; 2 four grey pixels.
+    // The bytes of a word of the frame: 0 red, green, blue, alpha; 1 blue, green, red, alpha; 2 four grey pixels.
     format: u32,
     // The last column of the frame, which the columns behind it repeat.
     last: u32,

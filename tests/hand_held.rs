@@ -83,7 +83,7 @@ impl Camera {
         [0, 1].map(|k| self.focal[1] * turned[k] / turned[2] + self.centre[1][k])
     }
 
-    /// What it takes of the original image.
+    /// The photograph by this camera: the original image, seen from its place, with this brightness and gamma.
     fn take(&self, image: &Image, [gain, gamma]: [f64; 2]) -> Image {
         let rgb = image.to_rgb8();
         let (width, height) = rgb.size();

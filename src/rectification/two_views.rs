@@ -197,7 +197,7 @@ impl TwoViews {
         self.unusual().iter().map(|v| v * v).sum()
     }
 
-    /// What [`TwoViews::fitted`] makes small.
+    /// The cost that [`TwoViews::fitted`] minimizes: squared row distances of `matches`, robust with a `scale`, and the priors.
     fn cost(&self, matches: &[Correspondence], scale: Option<f64>) -> f64 {
         let essential = self.essential();
         let of_matches: f64 = matches

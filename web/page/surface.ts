@@ -35,9 +35,11 @@ export class SurfaceTab {
     private size = { width: 0, height: 0 };
     /** Whether the surface shown is of this result and these cameras. */
     private fresh = false;
-    /** Number of points with at least this confidence, every how many pixels there is one, and how many were measured. */
+    /** Number of points with at least this confidence. */
     private atLeast = new Uint32Array(257);
+    /** Every how many rows and columns there is a point. */
     private step = 1;
+    /** Number of points that were measured; the others are filled. */
     private measured = 0;
     private open = false;
     /** The surface that is being made. */

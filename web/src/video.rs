@@ -26,7 +26,7 @@ pub struct Video {
     rig: Option<Rig>,
 }
 
-/// What the first frames have told.
+/// The rectification and the range that the frames of a video have, as learned from its first ones.
 struct Rig {
     /// None if the frames are rectified.
     rectification: Option<Rectification>,

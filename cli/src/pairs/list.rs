@@ -35,7 +35,7 @@ pub(crate) const COLUMNS: [&str; 12] = [
     "prior_unit",
     "prior_pose",
 ];
-/// What to do about a header, for messages.
+/// The remedy of messages about a list without a header.
 const HEADER: &str = "begin the list with a header such as name,left,right";
 /// Columns that say how to use a prior.
 const OF_PRIOR: [&str; 4] = ["prior_sigma", "prior_kind", "prior_unit", "prior_pose"];

@@ -158,7 +158,7 @@ fn a_stored_map_gives_the_same_page() {
     }
     assert_eq!(alone["cameras"]["guessed"], true);
 
-    // The other sign, and a calib.txt beside the map.
+    // A map with negative disparities (`--sign`), and a calib.txt beside the map.
     copy("mixed", &folder.join("scene"));
     matched(
         &folder,

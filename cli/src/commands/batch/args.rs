@@ -34,8 +34,8 @@ A list:
 /// LIST may also be a folder. If it holds the images of the cameras in the folders left and right, or in KITTI's `image_2` and `image_3`,
 /// `colored_0` and `colored_1`, or `image_0` and `image_1`, those with the same number are a pair, named after the left one. Colour pairs of
 /// KITTI take their calibrations from `calib_cam_to_cam` or calib, others the calib.txt in LIST. Else each .mpo or .jps file in LIST is a
-/// pair. Else each visible folder in LIST is a pair,
-/// in one of the layouts of `mrfgs evaluate`; without a calib.txt the range is that of the ground truth.
+/// pair. Else each visible folder in LIST is a pair, in one of the layouts of `mrfgs evaluate`; without a calib.txt the range is that of
+/// the ground truth.
 ///
 /// Names become file names: at most 200 bytes, letters of any script and spaces, but none of / \ : * ? " < > | and control characters, no
 /// leading . or -, no trailing . or space. Names must differ by more than case.

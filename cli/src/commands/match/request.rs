@@ -24,7 +24,7 @@ pub(super) struct Request<'a> {
     pub(super) rectifying: Option<Options>,
     /// An output that takes the cameras, if there is one.
     pub(super) cameras: Option<&'static Also>,
-    /// What takes the cameras: an output or a prior.
+    /// The flag of the output or prior that uses the cameras, and whether it can do without them.
     pub(super) need: Option<CameraNeed>,
     /// The camera of `--into`.
     pub(super) third: Option<ThirdCamera>,
