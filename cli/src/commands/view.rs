@@ -22,7 +22,7 @@ Examples:
 /// Show a disparity map and its surface in the browser
 ///
 /// MAP is a disparity map in pixels, from this or another program: .pfm, .tif, or 16-bit .png as in KITTI. The page shows it in colours
-/// with its values under the pointer, and the measured surface in 3-D; without cameras that surface is not to scale. It is one file that
+/// with its values under the pointer, and the surface in 3-D; without cameras that surface is not to scale. It is one file that
 /// needs no network, in the folder for temporary files or at --output. Confidence and validity are read from the files of --also confidence
 /// and --also validity beside MAP, such as d.confidence.png, if they are there.
 #[derive(clap::Args)]

@@ -135,7 +135,7 @@ pub(super) static ALL: &[Also] = &[
 
 const VIEW: Also = row(
     "view",
-    "A page to look at: LEFT, the map in colours with its values under the pointer, and the measured surface in 3-D. One .html file \
+    "A page to look at: LEFT, the map in colours with its values under the pointer, and the surface in 3-D. One .html file \
      that needs no network",
     Kind::View,
 );
